@@ -17,6 +17,8 @@ use stampfly_types::{Duration, Instant, Stamped, Vec3};
 const GOOD_FIX: f32 = 4.0;
 /// Velocity less wind leads on for so long after the last fix; then it is too far from where it thinks that it is. Receivers pause for less under trees and bridges.
 const LEADS: Duration = Duration::from_secs(10);
+/// Nobody takes off with a receiver that has been silent for longer.
+const LEADS_STANDING: Duration = Duration::from_secs(2);
 /// A sensor that has been silent for longer is none.
 const SILENT: Duration = Duration::from_millis(500);
 
@@ -133,7 +135,8 @@ impl Navigation {
     #[must_use]
     pub fn estimate(&self) -> StateEstimate {
         let estimate = self.eskf.estimate();
-        let led = self.fix_at.is_some_and(|at| self.now.since(at) < LEADS);
+        let leads = if self.on_ground { LEADS_STANDING } else { LEADS };
+        let led = self.fix_at.is_some_and(|at| self.now.since(at) < leads);
         let valid = estimate.valid.set(Validity::POSITION_XY, led && estimate.valid.contains(Validity::POSITION_XY));
         StateEstimate { valid, ..estimate }
     }

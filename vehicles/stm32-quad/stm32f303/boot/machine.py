@@ -8,7 +8,14 @@ import heapq
 import struct
 
 from unicorn import UC_ARCH_ARM, UC_HOOK_BLOCK, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
-from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_PRIMASK, UC_ARM_REG_SP, UC_CPU_ARM_CORTEX_M4
+from unicorn.arm_const import (
+    UC_ARM_REG_LR,
+    UC_ARM_REG_PC,
+    UC_ARM_REG_PRIMASK,
+    UC_ARM_REG_SP,
+    UC_ARM_REG_XPSR,
+    UC_CPU_ARM_CORTEX_M4,
+)
 
 HZ = 64_000_000
 FLASH, FLASH_SIZE = 0x0800_0000, 256 * 1024
@@ -16,6 +23,8 @@ MEMORY, MEMORY_SIZE = 0x2000_0000, 40 * 1024
 # Where an interrupt returns to: nothing of the chip is there.
 RETURN = 0x1FFF_F000
 YIELD, WFE, SEV = 0xBF10, 0xBF20, 0xBF40
+# Where the state of an IT block is in the program status.
+IT = 0x0600_FC00
 # Registers and a floating point context with its reserve.
 FRAME = 104
 
@@ -139,7 +148,10 @@ class Machine:
         key = place, size
         if key not in self.blocks:
             self.blocks[key] = self._look(place, size)
-        if self.events and self.events[0][0] <= self.cycles or self.pending and self._urgent() is not None:
+        is_due = self.events and self.events[0][0] <= self.cycles or self.pending and self._urgent() is not None
+        # A block may begin between an IT and its instructions. The core takes that state along and begins a handler without it; Unicorn would skip the
+        # handler's first instructions.
+        if is_due and not uc.reg_read(UC_ARM_REG_XPSR) & IT:
             # Before the block, which comes again.
             uc.emu_stop()
             return
