@@ -162,6 +162,10 @@ fn apart(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(|(found, truth)| (found - truth).abs()).fold(0.0, f64::max)
 }
 
+/// A gyro's look has a noise of 2 mrad/s, an axis, and the mean of so many a twentieth of what the worst drift is taken for. A magnetometer's has half a microtesla,
+/// and two looks that follow each other may be at one sample.
+const LOOKS: usize = 600;
+
 const XYZ: [&str; 3] = ["_x", "_y", "_z"];
 
 #[test]
@@ -201,7 +205,7 @@ fn the_magnetometer_shows_the_heading() {
     typed.calibrated();
     // Standing, nose north: the horizontal field is that of the earth.
     let error = |typed: &mut Typed| {
-        let field = typed.mean("sensor_mag", "field", 20);
+        let field = typed.mean("sensor_mag", "field", LOOKS);
         let yaw = typed.truth("attitude")[2];
         let off = FIELD[1].atan2(FIELD[0]) - field[1].atan2(field[0]) - yaw;
         let strength = field.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
@@ -222,9 +226,6 @@ fn the_magnetometer_shows_the_heading() {
     let earth = FIELD.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
     assert!((strength - earth).abs() < 1.0, "{strength} {earth}");
 }
-
-/// A look's noise is 2 mrad/s, an axis. The mean of so many has a twentieth of what the worst drift is taken for.
-const LOOKS: usize = 600;
 
 #[test]
 fn the_gyro_does_not_drift_with_its_temperature() {
