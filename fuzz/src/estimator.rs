@@ -1,9 +1,7 @@
 //! The estimator under any stream of samples, in any order, at any times.
 
 use crate::Input;
-use stampfly_eskf::aid::Row;
 use stampfly_eskf::aid::airspeed::Wind;
-use stampfly_eskf::filter::{N, NominalState};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData};
 use stampfly_types::{Duration, Instant, Quat, Vec3};
@@ -58,12 +56,6 @@ pub fn estimator_stream(data: &[u8]) {
             250 => {
                 let [speed, sigma] = [input.number(20.0), input.number(1.0)];
                 _ = eskf.fuse_airspeed(now, speed, sigma, &mut wind);
-            }
-            251 => {
-                let numbers: [f32; N] = [(); N].map(|()| input.number(1.0));
-                let (measured, variance, gate) = (input.number(5.0), input.number(1.0), input.number(5.0));
-                let model = |_: &NominalState| [Row { predicted: 0.0, jacobian: numbers }];
-                _ = eskf.fuse(now, model, [measured], [variance], gate);
             }
             _ => {
                 let velocity = input.vector(5.0);

@@ -438,10 +438,11 @@ impl Eskf {
     /// learns from its own measurement, of the variance `measured`.
     #[inline(never)]
     fn learn<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32, measured: f32) -> Fusion {
-        let before: [f32; N] = core::array::from_fn(|state| self.covariance.get(state, state));
         let fusion = self.update(innovation, ratio);
-        for (state, before) in before.into_iter().enumerate() {
-            if self.covariance.get(state, state) <= 0.0 {
+        for state in 0..N {
+            let left = self.covariance.get(state, state);
+            if left <= 0.0 {
+                let before = left + innovation.taken(state);
                 let variance = if state < ATTITUDE { math::smaller(before, measured) } else { before };
                 self.covariance.reset(state, variance);
             }

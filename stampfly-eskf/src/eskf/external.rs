@@ -236,6 +236,10 @@ impl Eskf {
     pub(super) fn update_attitude(&mut self, at: Instant, attitude: &Quat, sigma: f32) -> Result<Fusion, Refusal> {
         let [w, x, y, z] = attitude.wxyz();
         let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
+        if !(0.9..=1.1).contains(&attitude.norm_squared()) {
+            // Whoever makes one without a check may make one that is no rotation.
+            return Err(Refusal::Implausible);
+        }
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let variance = (sigma * sigma).max(1e-8);
         let error = aid::attitude::error(delayed.state.attitude, [w, x, y, z]);

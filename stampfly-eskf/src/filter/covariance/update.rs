@@ -29,6 +29,12 @@ impl<const M: usize> Innovation<M> {
         &self.whitened
     }
 
+    /// What the measurement takes from the variance of a state.
+    pub(crate) fn taken(&self, state: usize) -> f32 {
+        let (block, axis) = place(state);
+        self.gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
+    }
+
     /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with
     /// `M` degrees of freedom when the filter is consistent.
     #[inline]
