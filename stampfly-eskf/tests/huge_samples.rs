@@ -34,3 +34,23 @@ fn a_turn_of_many_revolutions_in_one_step_leaves_an_attitude() {
         assert!((0..15).all(|n| eskf.covariance().get(n, n).is_finite()), "step {step}");
     }
 }
+
+/// A model of one's own with a gate that lets all pass.
+#[test]
+fn a_measurement_that_would_leave_no_attitude_is_refused() {
+    use stampfly_eskf::aid::Row;
+    use stampfly_eskf::{Fusion, Refusal};
+    for (measured, slope) in [(1e16, 1.0), (1e12, 1e-3), (1e9, 1.0), (0.01, 1.0)] {
+        let mut eskf = Eskf::new(EskfConfig::default());
+        let level = Vec3::new(0.0, 0.0, -9.81);
+        eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: level, ..Default::default() });
+        let at = Instant::from_millis(10);
+        eskf.predict(at, &ImuData { accel: level, ..Default::default() });
+        let model = |_: &_| [Row { predicted: 0.0, jacobian: [slope; 15] }];
+        let fusion = eskf.fuse(at, model, [measured], [1e-3], f32::INFINITY);
+        let estimate = eskf.estimate();
+        let numbers = [estimate.attitude.norm_squared(), estimate.velocity.norm(), estimate.position.norm()];
+        assert!(numbers.iter().all(|number| number.is_finite()), "{measured}: {fusion:?} {estimate:?}");
+        assert_eq!(fusion == Fusion::Refused(Refusal::Implausible), measured > 1e6, "{measured}: {fusion:?}");
+    }
+}

@@ -15,6 +15,9 @@ const LEAST_POSITION: f32 = 1e-8;
 /// Variance of a position that says nothing yet, m²: a kilometre. The first fix is the position then.
 const NOWHERE: f32 = 1e6;
 
+/// Farther than this no single measurement moves a position, m, a velocity, m/s, an attitude, rad, and the biases of gyro and accelerometer, rad/s and m/s².
+const FARTHEST: [f32; N] = [1e7, 1e7, 1e7, 1e4, 1e4, 1e4, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 100.0, 100.0, 100.0];
+
 /// Share of a claim that is taken back with each fix when the receiver's error turns out to wander.
 const TAKEN_BACK: f32 = 0.1;
 
@@ -350,6 +353,11 @@ impl Eskf {
         let ratio = innovation.nis() / (gate * gate * EskfConfig::axes_factor(M));
         // No number is not below the gate either.
         if ratio <= 1.0 {
+            // A gate that lets all pass lets that pass, too.
+            let moves = innovation.correction();
+            if !moves.iter().zip(FARTHEST).all(|(moves, most)| moves.abs() < most) {
+                return Err(Refusal::Implausible);
+            }
             self.aided(&given);
             Ok(self.learn(&innovation, ratio, f32::INFINITY))
         } else {

@@ -35,6 +35,15 @@ impl<const M: usize> Innovation<M> {
         self.gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
     }
 
+    /// How far the measurement moves each state.
+    pub(crate) fn correction(&self) -> [f32; N] {
+        core::array::from_fn(|state| {
+            let (block, axis) = place(state);
+            let columns = self.gain.iter().zip(&self.whitened);
+            columns.filter_map(|(column, innovation)| Some(column.get(block)?.get(axis) * innovation)).sum()
+        })
+    }
+
     /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with
     /// `M` degrees of freedom when the filter is consistent.
     #[inline]
