@@ -315,3 +315,49 @@ impl<M: Measured> Verdict for Watched<M> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_types::Vec3;
+
+    #[derive(Default)]
+    struct Nothing;
+
+    impl Measured for Nothing {
+        fn is_degraded(&self) -> bool {
+            false
+        }
+
+        fn figures(&self) -> Vec<Figure> {
+            Vec::new()
+        }
+    }
+
+    /// Height and rate of sink, a look each, from the take-off on, and when disarmed again: how did it end?
+    fn flown(looks: &[(f64, f32)]) -> Class {
+        let (mut watched, injector) = (Watched::<Nothing>::new(0), Injector::new(Instant::ZERO, &[]));
+        let mut last = Truth::default();
+        for (second, (height, sink)) in (1..).zip(looks) {
+            last = Truth { velocity: Vec3::new(0.0, 0.0, *sink), contact: *height <= 0.0, ..Truth::default() };
+            let shown = Shown { armed: true, height: *height, ..Shown::default() };
+            watched.look(Instant::from_secs(second), &shown, &last, &injector);
+        }
+        watched.finished = true;
+        watched.end(&[], None, last, false);
+        watched.class()
+    }
+
+    #[test]
+    fn a_bounce_does_not_make_a_hard_touch_a_soft_one() {
+        assert_eq!(flown(&[(0.0, 0.0), (2.0, 1.0), (0.0, 1.0), (0.0, 0.0)]), Class::Transparent);
+        assert_eq!(flown(&[(0.0, 0.0), (2.0, 9.0), (0.0, 9.0), (1.0, 0.5), (0.0, 0.5)]), Class::Crashed);
+    }
+
+    #[test]
+    fn who_was_never_armed_was_refused() {
+        let mut watched = Watched::<Nothing>::new(1);
+        watched.end(&[], None, Truth { contact: true, ..Truth::default() }, false);
+        assert_eq!(watched.class(), Class::Refused);
+    }
+}
