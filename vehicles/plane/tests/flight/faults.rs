@@ -236,3 +236,13 @@ fn without_inertial_samples_the_throttle_closes_within_35_ms_for_good() {
     assert!(open.duty[0] > 0.1, "it was open");
     assert!(flown.outcome.cut && flown.outcome.succeeded(), "{}", flown.outcome.sentence());
 }
+
+/// Its receiver is silent from the moment on at which it could be armed.
+#[test]
+fn nobody_takes_off_with_a_receiver_that_is_silent() {
+    for fault in ["gnss-silent@ground", "gnss-lost@ground"] {
+        let flown = flight(fault);
+        assert_eq!(flown.outcome.class(), Class::Refused, "{fault}");
+        assert!(!flown.outcome.flown, "{fault}");
+    }
+}
