@@ -3,7 +3,7 @@
 //! [`Watched`] is a vehicle's `Outcome`, a [`Spectator`] looks for it. What a vehicle measures besides, and when that is too much, is its [`Measured`]. Not for vehicles with a judge of
 //! their own, which looks at alerts and phases.
 
-use crate::fault::{Class, Fault, Injector, Moment};
+use crate::fault::{Class, FAULT_ACTED, Fault, Injector, Moment};
 use crate::time::Clock;
 use crate::vehicle::{Figure, Verdict};
 use crate::{Truth, World};
@@ -37,9 +37,6 @@ pub struct Shown {
     /// It sinks, in order to land.
     pub lands: bool,
 }
-
-/// The invariant that every fault began and changed something: a flight without that says nothing.
-const FAULT_ACTED: &str = "I12";
 
 /// What one kind of vehicle measures of its flights.
 pub trait Measured {
@@ -77,7 +74,7 @@ pub trait Measured {
 ///     let shown = Shown { armed: true, height, ..Shown::default() };
 ///     watched.look(Instant::from_secs(second), &shown, truth, &injector);
 /// }
-/// assert!(watched.flown);
+/// assert!(watched.has_flown());
 /// watched.end(&[], None, ground, true);
 /// assert_eq!(watched.class(), Class::KeptOn, "still armed");
 /// ```
@@ -89,8 +86,6 @@ pub struct Watched<M> {
     pub legs: [usize; 2],
     /// It has been armed.
     pub armed: bool,
-    /// It has flown.
-    pub flown: bool,
     /// Is it disarmed in the end?
     pub disarmed: bool,
     /// It was disarmed in the air.
@@ -200,24 +195,24 @@ impl<M: Measured> Watched<M> {
         let Shown { ready, armed, height, stays, moves, lands } = *shown;
         let is_clear = height > CLEAR;
         self.armed |= armed;
-        if armed && is_clear && self.left.is_none() {
-            (self.flown, self.left) = (true, Some(now));
+        if armed && is_clear {
+            self.left.get_or_insert(now);
         }
-        self.cut |= !armed && is_clear && self.flown;
-        let touches = truth.contact && !self.touched && self.flown && !is_clear && !stays;
+        self.cut |= !armed && is_clear && self.has_flown();
+        let touches = truth.contact && !self.touched && self.has_flown() && !is_clear && !stays;
         self.touched = truth.contact;
         if touches {
             self.touchdown = self.touchdown.max(M::touch(truth));
         }
         self.tilt = self.tilt.max(frame::tilt(&truth.attitude));
-        let has_flown = self.left.is_some_and(|left| now.since(left) >= FLOWN);
+        let flies = self.left.is_some_and(|left| now.since(left) >= FLOWN);
         let moments = [
             (Moment::Ground, ready && !armed),
             (Moment::Spool, armed),
-            (Moment::TakeOff, self.flown),
-            (Moment::Hover, has_flown),
-            (Moment::Move, has_flown && moves),
-            (Moment::Landing, has_flown && lands),
+            (Moment::TakeOff, self.has_flown()),
+            (Moment::Hover, flies),
+            (Moment::Move, flies && moves),
+            (Moment::Landing, flies && lands),
             (Moment::Touch, touches),
         ];
         for (moment, _) in moments.iter().filter(|(_, has_come)| *has_come) {
@@ -232,6 +227,12 @@ impl<M: Measured> Watched<M> {
         self.expected = faults.iter().map(Fault::expected).max();
         let changes = |place| injector.map_or(0, |injector| injector.changes(place));
         self.faults = faults.iter().enumerate().map(|(place, fault)| (fault.to_string(), changes(place))).collect();
+    }
+
+    /// Has it left the ground?
+    #[must_use]
+    pub const fn has_flown(&self) -> bool {
+        self.left.is_some()
     }
 
     fn stands(&self) -> bool {

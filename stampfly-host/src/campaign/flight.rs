@@ -1,11 +1,12 @@
 //! Flies one flight of a campaign and makes its row.
 
 use super::case::Case;
-use super::row::{FAULT_ACTED, IDLE, PANICKED, PASSED, Row, UNJUDGED};
+use super::row::{IDLE, PANICKED, PASSED, Row, UNJUDGED};
 use crate::flown::{Flown, fly};
 use crate::recorder::Recorder;
 use serde::Deserialize;
 use stampfly_log::FlightHash;
+use stampfly_sim::fault::FAULT_ACTED;
 use stampfly_sim::vehicle::{SetupError, Vehicle, Verdict};
 use stampfly_types::Instant;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -4,6 +4,7 @@
 //! and `docs/campaigns.md` is held to it.
 
 use super::case::{Case, rest};
+use stampfly_sim::fault::FAULT_ACTED;
 use stampfly_sim::vehicle::Options;
 
 /// What a column holds.
@@ -172,8 +173,6 @@ pub const IDLE: &str = "idle";
 pub const UNJUDGED: &str = "unjudged";
 /// The verdict and outcome of a flight that was not flown to its end because the program had a defect.
 pub const PANICKED: &str = "panicked";
-/// The invariant that every fault began and changed something. It is about the campaign, not about the vehicle.
-pub const FAULT_ACTED: &str = "I12";
 
 impl Row {
     /// All columns of a file of such rows.

@@ -31,6 +31,9 @@ pub use when::{Moment, When};
 use core::fmt;
 use stampfly_types::Duration;
 
+/// The invariant that every fault of a flight began and changed something. It is about the flight, not about the vehicle: one without it says nothing.
+pub const FAULT_ACTED: &str = "I12";
+
 /// What the number of a fault means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultValue {

@@ -34,7 +34,7 @@ use serde::Serialize;
 pub(super) use sight::Sight;
 use stampfly_flight::newest::message;
 use stampfly_sim::Truth;
-use stampfly_sim::fault::{Class, Injector};
+use stampfly_sim::fault::{Class, FAULT_ACTED, Injector};
 use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, SystemAlert};
 use stampfly_types::{Duration, FieldKind, Instant, Message, frame};
 use std::string::{String, ToString};
@@ -337,7 +337,7 @@ impl Judge {
                 changes: self.injector.changes(place),
             })
             .collect();
-        self.invariants.require("I12", faults.iter().all(|span| span.since.is_some() && span.changes > 0));
+        self.invariants.require(FAULT_ACTED, faults.iter().all(|span| span.since.is_some() && span.changes > 0));
         let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Transparent);
         let outcome = self.class(begun);
         // Motors that were off already stayed off from the beginning of the fault.
