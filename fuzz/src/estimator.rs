@@ -1,7 +1,7 @@
 //! The estimator under any stream of samples, in any order, at any times.
 
 use crate::Input;
-use stampfly_eskf::aid::airspeed::Wind;
+use stampfly_eskf::aid::{Row, airspeed::Wind};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData};
 use stampfly_types::{Duration, Instant, Quat, Vec3};
@@ -56,6 +56,15 @@ pub fn estimator_stream(data: &[u8]) {
             250 => {
                 let [speed, sigma] = [input.number(20.0), input.number(1.0)];
                 _ = eskf.fuse_airspeed(now, speed, sigma, &mut wind);
+            }
+            251 => {
+                // A model of one's own that sees two errors of the state, whatever they are.
+                let places = input.byte();
+                let [predicted, measured] = [input.number(100.0), input.number(100.0)];
+                let entries =
+                    [(usize::from(places & 15), input.number(1.0)), (usize::from(places >> 4), input.number(1.0))];
+                let [variance, gate] = [input.number(1.0), input.number(5.0)];
+                _ = eskf.fuse(now, |_| [Row::new(predicted, entries)], [measured], [variance], gate);
             }
             _ => {
                 let velocity = input.vector(5.0);
