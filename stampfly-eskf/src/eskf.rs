@@ -433,28 +433,11 @@ impl Eskf {
         Fusion::Fused { ratio }
     }
 
-    /// Updates with what others have measured. What it takes from a variance that is all but certain may be more than there is, by its last digit, or by far
-    /// when inputs that contradict one another have left covariances that cannot be. Such a state has learnt nothing but what a position or a velocity
-    /// learns from its own measurement, of the variance `measured`.
-    #[inline(never)]
-    fn learn<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32, measured: f32) -> Fusion {
-        let fusion = self.update(innovation, ratio);
-        for state in 0..N {
-            let left = self.covariance.get(state, state);
-            if left <= 0.0 {
-                let before = left + innovation.taken(state);
-                let variance = if state < ATTITUDE { math::smaller(before, measured) } else { before };
-                self.covariance.reset(state, variance);
-            }
-        }
-        fusion
-    }
-
     /// Updates state and covariance with a pseudo-measurement, without a gate.
     fn constrain<const M: usize>(&mut self, rows: [Row; M], values: [f32; M], sigma: f32) {
         let innovation = self.innovation(&self.current_state(), rows, values, [sigma * sigma; M]);
         let ratio = self.test_ratio(&innovation);
-        _ = self.learn(&innovation, ratio, sigma * sigma);
+        _ = self.update(&innovation, ratio);
     }
 
     /// What became of a sensor's measurements since this filter was made, restarts included.

@@ -54,6 +54,6 @@ impl Eskf {
         self.aided(&[true, true, false]);
         let variance = limited(known, variance, wind.variance_along(nose));
         let innovation = self.innovation(delayed, [row], [speed], [variance]);
-        Ok(self.learn(&innovation, ratio, f32::INFINITY))
+        Ok(self.update(&innovation, ratio))
     }
 }

@@ -91,7 +91,7 @@ impl Eskf {
         match self.test_external(Sensor::Velocity, ratio) {
             GateResult::Fuse => {
                 self.aided(&axes.given);
-                Ok(self.learn(&innovation, ratio, LEAST_VELOCITY))
+                Ok(self.update(&innovation, ratio))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
@@ -140,7 +140,7 @@ impl Eskf {
             }
             GateResult::Fuse => {
                 self.aided(&axes.given);
-                Ok(self.learn(&innovation, ratio, LEAST_POSITION))
+                Ok(self.update(&innovation, ratio))
             }
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
@@ -171,7 +171,7 @@ impl Eskf {
         }
         let before = self.state.position;
         let innovation = self.innovation(delayed, axes.rows, axes.measured, variances);
-        let fusion = self.learn(&innovation, ratio, LEAST_POSITION);
+        let fusion = self.update(&innovation, ratio);
         self.wander.moved((self.state.position - before).into());
         fusion
     }
@@ -251,7 +251,7 @@ impl Eskf {
         let verdict =
             if self.is_north_known() { self.test_external(Sensor::Attitude, ratio) } else { GateResult::Reset };
         match verdict {
-            GateResult::Fuse => Ok(self.learn(&innovation, ratio, f32::INFINITY)),
+            GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
@@ -359,7 +359,7 @@ impl Eskf {
                 return Err(Refusal::Implausible);
             }
             self.aided(&given);
-            Ok(self.learn(&innovation, ratio, f32::INFINITY))
+            Ok(self.update(&innovation, ratio))
         } else {
             Ok(Fusion::Gated { ratio })
         }

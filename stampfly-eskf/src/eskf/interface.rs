@@ -125,6 +125,7 @@ impl Estimator for Eskf {
                 ..self.noise
             };
             self.covariance.propagate(&self.pending_rotation, &self.pending_step, &noise);
+            self.limit_attitude();
             self.pending_step = PropagationStep::default();
             self.pending_rotation = self.state.rotation();
         }

@@ -199,14 +199,15 @@ impl Eskf {
         }
         self.acceleration.update(middle, world);
         let (raw, bias) = (self.force + self.state.accel_bias, self.state.gyro_bias);
-        let before = rotate(&self.state.rotation(), &self.force);
+        let rotation = self.state.rotation();
+        let before = rotate(&rotation, &self.force);
         let fusion = match self.test(Sensor::Flow, ratio) {
             GateResult::Fuse => {
                 let mut correction = self.covariance.update(&innovation);
                 if self.command.flying {
                     self.covariance.consider(&innovation, VERTICAL, &mut correction);
                 }
-                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.flow_influence.add(&correction, &rotation, flow.interval);
                 self.state.correct(&correction);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
                 // nothing.
@@ -220,7 +221,7 @@ impl Eskf {
                 let mut correction = [0.0; N];
                 correction[VELOCITY] = world.x - delayed.state.velocity.x;
                 correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
-                self.flow_influence.add(&correction, &self.state.rotation(), flow.interval);
+                self.flow_influence.add(&correction, &rotation, flow.interval);
                 self.state.correct(&correction);
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);

@@ -16,6 +16,8 @@ use super::*;
 const GUST: f32 = 2.0;
 /// Standard deviation of what else the accelerometer feels along x and y, m/s².
 const FELT: f32 = 0.1;
+/// Variance of an angle that may be any, rad²: π²/3, and some more.
+const ANY_ATTITUDE: f32 = 4.0;
 /// Standard deviation of the heading where it is defined to be zero, rad.
 const HEADING_SIGMA: f32 = 1e-3;
 
@@ -106,6 +108,17 @@ impl Eskf {
                         self.state.velocity[axis] = 0.0;
                     }
                 }
+            }
+        }
+    }
+
+    /// Limits the variance of the attitude. A gyro that is shaken beyond its range says nothing, and soon the attitude could be anything;
+    /// more than that would only be large beside the other variances, whose digits it takes.
+    #[inline]
+    pub(super) fn limit_attitude(&mut self) {
+        for axis in ATTITUDE..GYRO_BIAS {
+            if self.covariance.get(axis, axis) > ANY_ATTITUDE {
+                self.covariance.reset(axis, ANY_ATTITUDE);
             }
         }
     }

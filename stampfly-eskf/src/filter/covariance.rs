@@ -108,13 +108,21 @@ impl Covariance {
         self.change(state, state, |before| before + variance);
     }
 
+    /// The diagonal.
+    #[inline(always)]
+    fn variances(&self) -> impl Iterator<Item = f32> {
+        self.rows.iter().enumerate().flat_map(|(block, rows)| {
+            rows.iter().enumerate().filter_map(move |(axis, row)| Some(row.get(block)?.get(axis)))
+        })
+    }
+
     /// Is every element finite and every variance positive?
     // Asked once in a hundred steps.
     #[inline(never)]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
         let sum: f32 = self.rows.iter().flatten().flatten().flat_map(|lanes| lanes.to_array()).sum();
-        sum.is_finite() && (0..N).all(|state| self.get(state, state) > 0.0)
+        sum.is_finite() && self.variances().all(|variance| variance > 0.0)
     }
 
     /// Copies the upper triangle, which was computed, to the lower one, of the first `COLUMNS` block columns.

@@ -7,6 +7,11 @@ use super::super::lanes::{Lanes, VECTORS};
 use super::{BLOCKS, Covariance, N, Row, add_rows, place};
 use stampfly_types::math;
 
+/// Share of a variance that rounding may make of what an update leaves of it.
+const ROUNDING: f32 = 1e-5;
+/// Variance of a state of which nothing is known any more, in its squared unit: a metre, a metre a second, a radian and so on.
+const LOST: f32 = 1.0;
+
 /// The innovation of a measurement of `M` axes, whitened, and the gain that goes with it.
 ///
 /// The axes are made independent by a Cholesky factorisation of their innovation covariance S = L·Lᵀ: the innovations
@@ -30,7 +35,7 @@ impl<const M: usize> Innovation<M> {
     }
 
     /// What the measurement takes from the variance of a state.
-    pub(crate) fn taken(&self, state: usize) -> f32 {
+    fn taken(&self, state: usize) -> f32 {
         let (block, axis) = place(state);
         self.gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
     }
@@ -107,6 +112,10 @@ impl Covariance {
     /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
     /// [`NominalState::correct`](crate::filter::NominalState::correct).
     ///
+    /// Variances stay positive, whatever measurements contradict one another. What is subtracted from one that is all but certain may be more
+    /// than there is by its last digit: then a hundred thousandth of it is left, without covariances. Where it is more by far, these
+    /// covariances cannot be: all of them are dropped, and the correction is zero.
+    ///
     /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
     pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
@@ -125,6 +134,9 @@ impl Covariance {
         states: [usize; K],
         correction: &mut [f32; N],
     ) {
+        if correction.iter().all(|moves| *moves == 0.0) {
+            return;
+        }
         // Checked, and free where the states are constants: they are inlined.
         let part = |column: &Row, state: usize| {
             let (block, axis) = place(state);
@@ -161,12 +173,38 @@ impl Covariance {
         if !WHOLE {
             self.mirror::<BLOCKS>();
         }
+        // Bits instead of comparisons: an instruction less for each. A float that is zero or negative, less one, has its first bit set.
+        if self.variances().fold(0, |bits, variance| bits | variance.to_bits().wrapping_sub(1)) > i32::MAX as u32
+            && self.repair(innovation)
+        {
+            return [0.0; N];
+        }
         let mut correction = [Lanes::zero(); BLOCKS];
         for (column, innovation) in gain.iter().zip(whitened) {
             add_rows::<0, 1>(&mut correction, [*innovation], [column]);
         }
         let [[a, b, c], [d, e, f], [g, h, i], [j, k, l], [m, n, o]] = correction.map(Lanes::to_array);
         [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]
+    }
+
+    /// Replaces variances of which more was taken than there is. Was it more than rounding can take? Then nothing has been learnt.
+    // Hardly ever.
+    #[cold]
+    #[inline(never)]
+    fn repair<const M: usize>(&mut self, innovation: &Innovation<M>) -> bool {
+        let before: [f32; N] = core::array::from_fn(|state| self.get(state, state) + innovation.taken(state));
+        let states = || before.into_iter().enumerate();
+        let cannot_be = states().any(|(state, before)| self.get(state, state) < -ROUNDING * before);
+        for (state, before) in states() {
+            if cannot_be {
+                // So much was taken that what there was is lost.
+                let is_lost = before <= ROUNDING * innovation.taken(state) || before.is_infinite();
+                self.reset(state, if is_lost { LOST } else { before });
+            } else if self.get(state, state) <= 0.0 {
+                self.reset(state, ROUNDING * before);
+            }
+        }
+        cannot_be
     }
 }
 

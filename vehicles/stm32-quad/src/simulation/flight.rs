@@ -53,6 +53,7 @@ pub struct Surroundings {
     motors: MotorModel,
     sensor: Option<Mpu6000Model>,
     sticks: Cell<Sticks>,
+    lights: Cell<ControlState>,
     progress: Progress,
     wrong: Wrong,
     newest: RefCell<Newest>,
@@ -73,6 +74,7 @@ impl Surroundings {
             setup: setup.clone(),
             motors: sensors.motors,
             sticks: Cell::new(Sticks::REST),
+            lights: Cell::default(),
             progress: Progress::default(),
             wrong: Wrong::new(&faults, config.start, Air::new(&clock, config.seed)),
             newest: RefCell::new(Newest::new()),
@@ -92,7 +94,7 @@ impl vehicle::Surroundings for Surroundings {
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Around<'a> {
-        let Self { setup, clock, world, motors, sensor, sticks, progress, wrong, newest } = self;
+        let Self { setup, clock, world, motors, sensor, sticks, lights, progress, wrong, newest } = self;
         let sensor = sensor.take().expect("surroundings are started once");
         let (seed, vibration) = (setup.simulation.seed, setup.simulation.vibration);
         if setup.chips {
@@ -109,7 +111,7 @@ impl vehicle::Surroundings for Surroundings {
         }
         tasks.spawn(convert(clock.clone(), world.clone(), setup.parameters.battery, outside.battery));
         radio::start(tasks, clock, &wrong.air, seed, sticks, outside.receiver);
-        let pilot = Pilot::new(clock, world, sticks, setup.parameters.stick, setup.acro);
+        let pilot = Pilot::new(clock, world, sticks, lights, setup.parameters.stick, setup.acro);
         tasks.spawn(pilot.fly(&setup.mission, progress));
         if let Some(live) = &setup.live {
             let services = serial::services(live, &wrong.injector, &setup.parameters, newest, outside.link);
@@ -121,6 +123,7 @@ impl vehicle::Surroundings for Surroundings {
             setup,
             wrong: wrong.clone(),
             progress,
+            lights,
             motors: motors.clone(),
             duties: outside.motors.actuator_motor,
             seen: Seen::default(),
@@ -171,6 +174,7 @@ pub struct Around<'a> {
     setup: &'a Setup,
     wrong: Wrong,
     progress: &'a Progress,
+    lights: &'a Cell<ControlState>,
     motors: MotorModel,
     duties: topics::ActuatorMotorRx<'a>,
     seen: Seen,
@@ -240,7 +244,10 @@ impl vehicle::Around for Around<'_> {
         let seen = &mut self.seen;
         match Id::ALL.get(topic) {
             Some(Id::attitude) => seen.attitude = message(words).unwrap_or(seen.attitude),
-            Some(Id::control_state) => seen.state = message(words).unwrap_or(seen.state),
+            Some(Id::control_state) => {
+                seen.state = message(words).unwrap_or(seen.state);
+                self.lights.set(seen.state);
+            }
             Some(Id::flight_status) => {
                 seen.ready = message(words).is_some_and(|status: FlightStatus| status.blocks.is_empty());
             }

@@ -1,8 +1,10 @@
 //! A simulated pilot with a HiSKY transmitter: calibrates and arms with the sticks, flies the mission by sight, lands, disarms.
 //!
-//! The pilot sees the vehicle, and its lights not at all. Sticks are angles in ANGLE and rates in ACRO; throttle is thrust in both.
+//! The pilot sees the vehicle and its lights, and repeats a gesture that they do not answer: a packet was lost. Sticks are angles in
+//! ANGLE and rates in ACRO; throttle is thrust in both.
 
 use super::plant::HOVER;
+use crate::messages::ControlState;
 use crate::parameters::StickParameters;
 use core::cell::Cell;
 use stampfly_link::hisky::HiskyChannels;
@@ -15,6 +17,9 @@ use stampfly_types::{Duration, Vec3};
 const CALIBRATE: Sticks = Sticks { yaw: -1.0, throttle: 1.0, ..Sticks::REST };
 const ARM: Sticks = Sticks { yaw: 1.0, ..Sticks::REST };
 const DISARM: Sticks = Sticks { yaw: -1.0, ..Sticks::REST };
+
+/// A pilot whose gesture is not answered so many times puts the transmitter down.
+const TRIES: u8 = 10;
 
 /// Sticks of the transmitter: −1 to 1, throttle 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +64,7 @@ impl Sticks {
 pub struct Pilot<'a> {
     clock: Clock,
     transmitter: &'a Cell<Sticks>,
+    lights: &'a Cell<ControlState>,
     meaning: StickParameters,
     acro: bool,
     eye: Eye,
@@ -66,34 +72,49 @@ pub struct Pilot<'a> {
 }
 
 impl<'a> Pilot<'a> {
-    /// With this transmitter in the hands.
+    /// With this transmitter in the hands, and with lights that show this.
     pub fn new(
         clock: &Clock,
         world: &World,
         transmitter: &'a Cell<Sticks>,
+        lights: &'a Cell<ControlState>,
         meaning: StickParameters,
         acro: bool,
     ) -> Self {
         let eye = Eye::new(world, clock.now());
-        Self { clock: clock.clone(), transmitter, meaning, acro, eye, hand: Hand::default() }
+        Self { clock: clock.clone(), transmitter, lights, meaning, acro, eye, hand: Hand::default() }
     }
 
     /// Flies it. Without a place to fly to it is made ready and stands.
     pub async fn fly(mut self, places: &Places, progress: &Progress) {
         self.hold(Sticks::REST, 1.0).await;
-        self.hold(CALIBRATE, 0.3).await;
-        self.hold(Sticks::REST, 2.2).await;
+        let is_calibrated = self.gesture(CALIBRATE, |lights| lights.calibrating, 2.2).await;
         if places.0.is_empty() {
             return;
         }
-        self.hold(ARM, 0.3).await;
-        self.hold(Sticks::REST, 0.5).await;
+        if !is_calibrated || !self.gesture(ARM, |lights| lights.armed, 0.5).await {
+            progress.finished.set(true);
+            return;
+        }
         let clock = self.clock.clone();
         places.fly(&clock, progress, &mut async |place, sinks| self.steer(place, sinks).await).await;
         self.hold(Sticks::REST, 0.5).await;
         self.hold(DISARM, 0.5).await;
         self.transmitter.set(Sticks::REST);
         progress.finished.set(true);
+    }
+
+    /// Makes a gesture until the lights say that it was seen, and waits for some seconds after it. Was it?
+    async fn gesture(&mut self, sticks: Sticks, is_seen: impl Fn(&ControlState) -> bool, seconds: f32) -> bool {
+        for _ in 0..TRIES {
+            self.hold(sticks, 0.3).await;
+            let seen = is_seen(&self.lights.get());
+            self.hold(Sticks::REST, seconds).await;
+            if seen {
+                return true;
+            }
+        }
+        false
     }
 
     async fn hold(&mut self, sticks: Sticks, seconds: f32) {
