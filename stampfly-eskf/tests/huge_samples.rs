@@ -54,3 +54,24 @@ fn a_measurement_that_would_leave_no_attitude_is_refused() {
         assert_eq!(fusion == Fusion::Refused(Refusal::Implausible), measured > 1e6, "{measured}: {fusion:?}");
     }
 }
+
+/// Whose square is infinite.
+#[test]
+fn a_standard_deviation_beyond_any_says_nothing() {
+    use stampfly_types::Quat;
+    let (far, nothing) = (Vec3::new(50.0, -50.0, 20.0), Vec3::new(3e19, 3e19, 3e19));
+    let mut eskf = Eskf::new(EskfConfig::default());
+    let level = Vec3::new(0.0, 0.0, -9.81);
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: level, ..Default::default() });
+    for step in 1..=1_000 {
+        let at = Instant::from_millis(5 * step);
+        eskf.predict(at, &ImuData { accel: level, ..Default::default() });
+        let fusions = [
+            eskf.fuse_velocity(at, &far, &nothing),
+            eskf.fuse_position(at, &far, &nothing),
+            eskf.fuse_attitude(at, &Quat::new_unchecked(0.0, 1.0, 0.0, 0.0), 3e19),
+        ];
+        assert!((0..15).all(|n| eskf.covariance().get(n, n).is_finite()), "step {step}: {fusions:?}");
+    }
+    assert!(eskf.estimate().position.norm() < 1.0, "{:?}", eskf.estimate());
+}

@@ -1,10 +1,11 @@
 //! What others measure: position, velocity and attitude from outside, and sensors with a model of the user's.
 //!
-//! Each axis has its own standard deviation; one with an infinite deviation was not measured. For the sensors that the
+//! Each axis has its own standard deviation; one with an infinite deviation, or one of a thousand kilometres, was not measured. For the sensors that the
 //! filter knows by itself see [`measurements`](super::measurements).
 
 use super::alignment::Step;
 use super::gate::{GateResult, Sensor};
+use super::pseudo_measurements::ANY_ATTITUDE;
 use super::wander::limited;
 use super::*;
 use crate::measurements::Aiding;
@@ -14,6 +15,9 @@ const LEAST_VELOCITY: f32 = 1e-6;
 const LEAST_POSITION: f32 = 1e-8;
 /// Variance of a position that says nothing yet, m²: a kilometre. The first fix is the position then.
 const NOWHERE: f32 = 1e6;
+
+/// An axis with this standard deviation, m or m/s, or an infinite one, was not measured. Squares of larger ones overflow.
+const NOT_MEASURED: f32 = 1e6;
 
 /// Farther than this no single measurement moves a position, m, a velocity, m/s, an attitude, rad, and the biases of gyro and accelerometer, rad/s and m/s².
 const FARTHEST: [f32; N] = [1e7, 1e7, 1e7, 1e4, 1e4, 1e4, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 100.0, 100.0, 100.0];
@@ -34,7 +38,7 @@ impl Axes {
     fn new(mut rows: [Row; 3], values: &Vec3, sigma: &Vec3, least: f32) -> Self {
         let mut axes = Self { rows, measured: (*values).into(), variances: [1.0; 3], given: [true; 3] };
         for axis in 0..3 {
-            if sigma[axis].is_infinite() {
+            if says_nothing(sigma[axis]) {
                 axes.given[axis] = false;
                 rows[axis].jacobian = [0.0; N];
                 axes.measured[axis] = rows[axis].predicted;
@@ -61,11 +65,16 @@ impl Axes {
     }
 }
 
+/// Was an axis with this standard deviation not measured?
+const fn says_nothing(sigma: f32) -> bool {
+    sigma.abs() >= NOT_MEASURED
+}
+
 /// Finite where it counts: every axis that is given, and no deviation that is no number.
 fn is_given(values: &Vec3, sigma: &Vec3) -> [f32; 3] {
     let given = |value: f32, sigma: f32| match sigma {
         _ if sigma.is_nan() => f32::NAN,
-        _ if sigma.is_infinite() => 0.0,
+        _ if says_nothing(sigma) => 0.0,
         _ => value,
     };
     let ([north, east, down], [of_north, of_east, of_down]) = (values.to_array(), sigma.to_array());
@@ -257,7 +266,7 @@ impl Eskf {
                 self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
                 self.reset_history();
                 for axis in 0..3 {
-                    self.covariance.reset(ATTITUDE + axis, 4.0 * variance);
+                    self.covariance.reset(ATTITUDE + axis, math::smaller(4.0 * variance, ANY_ATTITUDE));
                     self.covariance.inflate(VELOCITY + axis, 0.1);
                     self.covariance.inflate(GYRO_BIAS + axis, 1e-5);
                 }

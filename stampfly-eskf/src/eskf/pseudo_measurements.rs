@@ -17,7 +17,7 @@ const GUST: f32 = 2.0;
 /// Standard deviation of what else the accelerometer feels along x and y, m/s².
 const FELT: f32 = 0.1;
 /// Variance of an angle that may be any, rad²: π²/3, and some more.
-const ANY_ATTITUDE: f32 = 4.0;
+pub(super) const ANY_ATTITUDE: f32 = 4.0;
 /// Standard deviation of the heading where it is defined to be zero, rad.
 const HEADING_SIGMA: f32 = 1e-3;
 

@@ -157,3 +157,48 @@ fn reset_clears_the_covariances_of_the_state() {
     p.reset(3, 4.0);
     assert_eq!((p.get(0, 3), p.get(3, 0), p.get(3, 3)), (0.0, 0.0, 4.0));
 }
+
+/// Two states whose covariance is larger than both their variances, beside others that are sound.
+fn contradicting(covariance: f32) -> Covariance {
+    let mut p = Covariance::from_sigmas([1.0, 1.0, 0.1, 0.01, 0.1]);
+    p.change(0, 3, |_| covariance);
+    p.change(3, 0, |_| covariance);
+    p
+}
+
+#[test]
+fn covariances_that_cannot_be_are_dropped_and_teach_nothing() {
+    for covariance in [3.0, 10.0, 1e10, 1e18] {
+        let mut p = contradicting(covariance);
+        let innovation = p.innovation(&[jacobian(&[(0, 1.0)])], [0.5], [0.01]);
+        let mut correction = p.update(&innovation);
+        assert_eq!(correction, [0.0; N], "{covariance}");
+        let after = p;
+        p.consider(&innovation, [2, 5, 14], &mut correction);
+        assert_eq!(p, after, "nothing to take back");
+        let expected = Covariance::from_sigmas([1.0, 1.0, 0.1, 0.01, 0.1]);
+        for state in 0..N {
+            let (left, before) = (p.get(state, state), expected.get(state, state));
+            assert!((left / before - 1.0).abs() < 1e-4, "{covariance}: {left}, not {before}");
+        }
+        assert_eq!(p.get(0, 3), 0.0);
+        // The next measurement teaches what it should.
+        let innovation = p.innovation(&[jacobian(&[(0, 1.0)])], [0.5], [0.01]);
+        assert!((p.update(&innovation)[0] - 0.5).abs() < 0.01 && p.is_healthy());
+    }
+}
+
+/// A kilometre, and then a tenth of a millimetre: the difference is below the last digit.
+#[test]
+fn an_update_by_more_digits_than_there_are_leaves_a_variance() {
+    for sigma in [1e3, 1e5, 1e9] {
+        let mut p = Covariance::from_sigmas([sigma, 1.0, 0.1, 0.01, 0.1]);
+        for _ in 0..3 {
+            let h = [jacobian(&[(0, 1.0)]), jacobian(&[(1, 1.0)])];
+            let innovation = p.innovation(&h, [5.0, -5.0], [1e-8; 2]);
+            _ = p.update(&innovation);
+            assert!(p.is_healthy(), "{sigma}: {p:?}");
+        }
+        assert!(p.get(0, 0) < 1e-5 * sigma * sigma, "{sigma}: {}", p.get(0, 0));
+    }
+}
