@@ -17,6 +17,8 @@ use stampfly_types::{Duration, Vec3};
 const CALIBRATE: Sticks = Sticks { yaw: -1.0, throttle: 1.0, ..Sticks::REST };
 const ARM: Sticks = Sticks { yaw: 1.0, ..Sticks::REST };
 const DISARM: Sticks = Sticks { yaw: -1.0, ..Sticks::REST };
+/// Three quarters of the weight, then a third: one that bounces settles level, while motors that stand would let it fall and tip.
+const SETTLE: [Sticks; 2] = [Sticks { throttle: 0.45, ..Sticks::REST }, Sticks { throttle: 0.2, ..Sticks::REST }];
 
 /// A pilot whose gesture is not answered so many times puts the transmitter down.
 const TRIES: u8 = 10;
@@ -98,6 +100,9 @@ impl<'a> Pilot<'a> {
         }
         let clock = self.clock.clone();
         places.fly(&clock, progress, &mut async |place, sinks| self.steer(place, sinks).await).await;
+        for sticks in SETTLE {
+            self.hold(sticks, 0.5).await;
+        }
         self.hold(Sticks::REST, 0.5).await;
         self.hold(DISARM, 0.5).await;
         self.transmitter.set(Sticks::REST);
