@@ -194,12 +194,14 @@ impl Covariance {
     fn repair<const M: usize>(&mut self, innovation: &Innovation<M>) -> bool {
         let before: [f32; N] = core::array::from_fn(|state| self.get(state, state) + innovation.taken(state));
         let states = || before.into_iter().enumerate();
-        let cannot_be = states().any(|(state, before)| self.get(state, state) < -ROUNDING * before);
+        let is_rounding = |(state, before): (usize, f32)| self.get(state, state) >= -ROUNDING * before;
+        // What has overflowed is no number, and that is not rounding either.
+        let cannot_be = !states().all(is_rounding);
         for (state, before) in states() {
             if cannot_be {
                 // So much was taken that what there was is lost.
-                let is_lost = before <= ROUNDING * innovation.taken(state) || before.is_infinite();
-                self.reset(state, if is_lost { LOST } else { before });
+                let is_left = before.is_finite() && before > ROUNDING * innovation.taken(state);
+                self.reset(state, if is_left { before } else { LOST });
             } else if self.get(state, state) <= 0.0 {
                 self.reset(state, ROUNDING * before);
             }
