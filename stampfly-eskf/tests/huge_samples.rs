@@ -75,3 +75,32 @@ fn a_standard_deviation_beyond_any_says_nothing() {
     }
     assert!(eskf.estimate().position.norm() < 1.0, "{:?}", eskf.estimate());
 }
+
+/// Said by somebody who is otherwise believed: after the lock-out the filter would be reset to it.
+#[test]
+fn a_place_or_speed_of_no_vehicle_is_refused_however_often_it_is_told() {
+    use stampfly_eskf::{Fusion, Refusal};
+    use stampfly_types::messages::FlowData;
+    let mut eskf = Eskf::new(EskfConfig::default());
+    let level = Vec3::new(0.0, 0.0, -9.81);
+    eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: level, ..Default::default() });
+    let sigma = Vec3::new(0.1, 0.1, f32::INFINITY);
+    for step in 1..=1_000 {
+        let at = Instant::from_millis(5 * step);
+        eskf.predict(at, &ImuData { accel: level, ..Default::default() });
+        if step < 100 {
+            continue;
+        }
+        let far = Vec3::new(0.0, -1e28, 1e30);
+        assert_eq!(eskf.fuse_velocity(at, &far, &sigma), Fusion::Refused(Refusal::Implausible));
+        assert_eq!(eskf.fuse_position(at, &far, &sigma), Fusion::Refused(Refusal::Implausible));
+        let flow = FlowData { delta_x: 1e38, delta_y: 0.0, interval: 0.01, quality: 200, valid: true };
+        assert_eq!(eskf.fuse_flow(at, &flow), Fusion::Refused(Refusal::Range));
+    }
+    // What is not measured may be anything.
+    let down = Vec3::new(0.1, -0.1, 1e30);
+    let at = Instant::from_millis(5_005);
+    eskf.predict(at, &ImuData { accel: level, ..Default::default() });
+    assert!(eskf.fuse_velocity(at, &down, &sigma).is_fused());
+    assert!(eskf.estimate().position.norm() < 1.0, "{:?}", eskf.estimate());
+}

@@ -19,7 +19,7 @@ const NOWHERE: f32 = 1e6;
 /// An axis with this standard deviation, m or m/s, or an infinite one, was not measured. Squares of larger ones overflow.
 const NOT_MEASURED: f32 = 1e6;
 
-/// Farther than this no single measurement moves a position, m, a velocity, m/s, an attitude, rad, and the biases of gyro and accelerometer, rad/s and m/s².
+/// Farther than this no vehicle is and flies, and no single measurement moves a position, m, a velocity, m/s, an attitude, rad, and the biases of gyro and accelerometer, rad/s and m/s².
 const FARTHEST: [f32; N] = [1e7, 1e7, 1e7, 1e4, 1e4, 1e4, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 100.0, 100.0, 100.0];
 
 /// Share of a claim that is taken back with each fix when the receiver's error turns out to wander.
@@ -48,6 +48,11 @@ impl Axes {
         }
         axes.rows = rows;
         axes
+    }
+
+    /// Is this no position or velocity of any vehicle?
+    fn are_beyond(&self, farthest: f32) -> bool {
+        self.measured.iter().any(|value| value.abs() > farthest)
     }
 
     fn count(&self) -> usize {
@@ -87,6 +92,9 @@ impl Eskf {
         let age = self.admit(Sensor::Velocity, at, &is_given(velocity, sigma))?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let mut axes = Axes::new(aid::velocity::world(&delayed.state), velocity, sigma, LEAST_VELOCITY);
+        if axes.are_beyond(FARTHEST[VELOCITY]) {
+            return Err(Refusal::Implausible);
+        }
         if !self.is_north_known() && axes.given[0] && axes.given[1] {
             self.align(at, delayed, &axes);
             axes.drop_level();
@@ -122,6 +130,9 @@ impl Eskf {
         let age = self.admit(Sensor::Position, at, &is_given(position, sigma))?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         let mut axes = Axes::new(aid::position::world(&delayed.state), position, sigma, LEAST_POSITION);
+        if axes.are_beyond(FARTHEST[POSITION]) {
+            return Err(Refusal::Implausible);
+        }
         let first = core::array::from_fn::<_, 3, _>(|axis| axes.given[axis] && self.is_nowhere(axis));
         if !self.is_north_known() || first.contains(&true) {
             // Without a heading the inertial sensor does not carry the position from fix to fix.

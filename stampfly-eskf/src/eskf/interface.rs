@@ -15,8 +15,8 @@ const CERTAIN_HEADING: f32 = 0.35;
 
 impl Estimator for Eskf {
     fn initialize(&mut self, at: Instant, calibration: &CalibrationResult) {
-        let finite = |v: &Vec3| v.iter().all(|x| x.is_finite());
-        if !finite(&calibration.gyro_bias) || !finite(&calibration.specific_force) {
+        let is_usable = |v: &Vec3| v.norm_squared() < LARGEST * LARGEST;
+        if !is_usable(&calibration.gyro_bias) || !is_usable(&calibration.specific_force) {
             return;
         }
         // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the

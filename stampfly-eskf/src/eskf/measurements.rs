@@ -24,6 +24,8 @@ const REJECTED: f32 = 2.0;
 const WRONG_CLIMB: f32 = 1.5;
 /// At this distance an error of the velocity of 0.05 m/s is a rate of 0.33 rad/s.
 const GYRO_DISTANCE: f32 = 0.15;
+/// The picture never moves farther in its longest interval, rad: 100 rad/s, more than any gyro measures.
+const LARGEST_FLOW: f32 = 10.0;
 /// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
 const SHAKEN: f32 = 100.0;
 /// A vehicle that turns faster, rad/s, does not stand.
@@ -118,7 +120,7 @@ impl Eskf {
         if !flow.valid || flow.quality < self.config.flow_min_quality {
             return Err(Refusal::Quality);
         }
-        if !(1e-3..=0.1).contains(&flow.interval) {
+        if !(1e-3..=0.1).contains(&flow.interval) || flow.delta_x.abs() + flow.delta_y.abs() > LARGEST_FLOW {
             return Err(Refusal::Range);
         }
         // The reading is the mean velocity over the interval: compare it with the state in the middle of it.
