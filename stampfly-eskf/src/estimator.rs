@@ -43,7 +43,7 @@ pub enum Refusal {
     NotInitialized,
     /// The driver does not vouch for it, or its quality is too low.
     Quality,
-    /// The sensor contradicts the others, and is left out until it agrees with them.
+    /// The sensor contradicts the others, and is left out until it agrees with them; or no vehicle is or moves like this.
     Implausible,
     /// A number in it is not finite.
     NotFinite,
