@@ -428,7 +428,9 @@ impl Eskf {
     /// Updates state and covariance with a measurement.
     #[inline]
     fn update<const M: usize>(&mut self, innovation: &Innovation<M>, ratio: f32) -> Fusion {
-        let correction = self.covariance.update(innovation);
+        let Some(correction) = self.covariance.try_update(innovation) else {
+            return Fusion::Refused(Refusal::Implausible);
+        };
         self.state.correct(&correction);
         Fusion::Fused { ratio }
     }

@@ -205,7 +205,9 @@ impl Eskf {
         let before = rotate(&rotation, &self.force);
         let fusion = match self.test(Sensor::Flow, ratio) {
             GateResult::Fuse => {
-                let mut correction = self.covariance.update(&innovation);
+                let Some(mut correction) = self.covariance.try_update(&innovation) else {
+                    return Err(Refusal::Implausible);
+                };
                 if self.command.flying {
                     self.covariance.consider(&innovation, VERTICAL, &mut correction);
                 }

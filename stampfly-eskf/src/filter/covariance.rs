@@ -116,13 +116,13 @@ impl Covariance {
         })
     }
 
-    /// Is every element finite and every variance positive?
+    /// Is every element finite and no variance negative?
     // Asked once in a hundred steps.
     #[inline(never)]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
         let sum: f32 = self.rows.iter().flatten().flatten().flat_map(|lanes| lanes.to_array()).sum();
-        sum.is_finite() && self.variances().all(|variance| variance > 0.0)
+        sum.is_finite() && self.variances().all(|variance| variance >= 0.0)
     }
 
     /// Copies the upper triangle, which was computed, to the lower one, of the first `COLUMNS` block columns.

@@ -112,13 +112,19 @@ impl Covariance {
     /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
     /// [`NominalState::correct`](crate::filter::NominalState::correct).
     ///
-    /// Variances stay positive, whatever measurements contradict one another. What is subtracted from one that is all but certain may be more
+    /// No variance becomes negative, whatever measurements contradict one another. What is subtracted from one that is all but certain may be more
     /// than there is by its last digit: then a hundred thousandth of it is left, without covariances. Where it is more by far, these
     /// covariances cannot be: all of them are dropped, and the correction is zero.
     ///
     /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
     #[inline]
     pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+        self.try_update(innovation).unwrap_or([0.0; N])
+    }
+
+    /// The same; `None` where covariances that cannot be are dropped, and nothing is learnt.
+    #[inline]
+    pub fn try_update<const M: usize>(&mut self, innovation: &Innovation<M>) -> Option<[f32; N]> {
         self.update_with::<M, VECTORS>(innovation)
     }
 
@@ -126,7 +132,7 @@ impl Covariance {
     /// 1966): what they may be wrong by has counted in the innovation, and the measurement corrects neither them nor their
     /// covariance.
     ///
-    /// Must follow [`Self::update`] with this innovation, which returned this correction, directly.
+    /// Must follow [`Self::try_update`] with this innovation, which returned this correction, directly.
     #[inline]
     pub fn consider<const M: usize, const K: usize>(
         &mut self,
@@ -134,9 +140,6 @@ impl Covariance {
         states: [usize; K],
         correction: &mut [f32; N],
     ) {
-        if correction.iter().all(|moves| *moves == 0.0) {
-            return;
-        }
         // Checked, and free where the states are constants: they are inlined.
         let part = |column: &Row, state: usize| {
             let (block, axis) = place(state);
@@ -157,12 +160,15 @@ impl Covariance {
     }
 
     #[inline]
-    pub(super) fn update_with<const M: usize, const WHOLE: bool>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
+    pub(super) fn update_with<const M: usize, const WHOLE: bool>(
+        &mut self,
+        innovation: &Innovation<M>,
+    ) -> Option<[f32; N]> {
         let Innovation { gain, whitened } = innovation;
         // A NaN must not spread into the covariance: any NaN makes the sum one.
         let sum = gain.iter().flatten().fold(Lanes::zero(), |sum, lanes| sum + *lanes);
         if sum.to_array().iter().sum::<f32>().is_nan() {
-            return [f32::NAN; N];
+            return Some([f32::NAN; N]);
         }
         let [position, velocity, attitude, gyro_bias, accel_bias] = &mut self.rows;
         subtract_outer_products::<0, WHOLE, M>(position, gain);
@@ -173,18 +179,19 @@ impl Covariance {
         if !WHOLE {
             self.mirror::<BLOCKS>();
         }
-        // Bits instead of comparisons: an instruction less for each. A float that is zero or negative, less one, has its first bit set.
-        if self.variances().fold(0, |bits, variance| bits | variance.to_bits().wrapping_sub(1)) > i32::MAX as u32
+        // Bits instead of comparisons, two instructions less for each: the first one of a negative number is set. One that is zero is lifted to
+        // its floor in the next step.
+        if self.variances().fold(0, |bits, variance| bits | variance.to_bits()) > i32::MAX as u32
             && self.repair(innovation)
         {
-            return [0.0; N];
+            return None;
         }
         let mut correction = [Lanes::zero(); BLOCKS];
         for (column, innovation) in gain.iter().zip(whitened) {
             add_rows::<0, 1>(&mut correction, [*innovation], [column]);
         }
         let [[a, b, c], [d, e, f], [g, h, i], [j, k, l], [m, n, o]] = correction.map(Lanes::to_array);
-        [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]
+        Some([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o])
     }
 
     /// Replaces variances of which more was taken than there is. Was it more than rounding can take? Then nothing has been learnt.
