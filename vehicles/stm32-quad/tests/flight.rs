@@ -73,6 +73,19 @@ fn packets_that_are_lost_do_not_matter_and_a_transmitter_that_is_gone_stops_the_
 }
 
 #[test]
+fn a_gesture_that_is_lost_with_its_packets_is_made_again() {
+    // The first to calibrate, the second to arm.
+    for text in ["link-lost@0.9+0.6", "link-lost@3.4+0.6"] {
+        let outcome = fly(&fault(text), 3);
+        assert!(outcome.succeeded() && outcome.finished && !outcome.cut, "{text}: {}", outcome.sentence());
+        assert!(outcome.legs[0] == outcome.legs[1] && outcome.legs[1] > 0, "{text}: {:?}", outcome.legs);
+        // Uncalibrated it is off by more.
+        let off = outcome.measured.estimate.value().expect("it was armed").to_degrees();
+        assert!(off < 1.5, "{text}: {off} degrees");
+    }
+}
+
+#[test]
 fn what_a_pilot_can_fly_with_is_flown_home_and_what_not_is_cut() {
     for text in ["gyro-bias@hover", "accel-bias@hover", "motor-weak=0.2@hover", "imu-silent@hover"] {
         for seed in 1..=2 {

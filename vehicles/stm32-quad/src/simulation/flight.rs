@@ -111,7 +111,7 @@ impl vehicle::Surroundings for Surroundings {
         }
         tasks.spawn(convert(clock.clone(), world.clone(), setup.parameters.battery, outside.battery));
         radio::start(tasks, clock, &wrong.air, seed, sticks, outside.receiver);
-        let pilot = Pilot::new(clock, world, sticks, lights, setup.parameters.stick, setup.acro);
+        let pilot = Pilot::new(clock, world, sticks, setup.parameters.stick, setup.acro).with_lights(lights);
         tasks.spawn(pilot.fly(&setup.mission, progress));
         if let Some(live) = &setup.live {
             let services = serial::services(live, &wrong.injector, &setup.parameters, newest, outside.link);

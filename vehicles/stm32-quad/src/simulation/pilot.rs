@@ -66,7 +66,7 @@ impl Sticks {
 pub struct Pilot<'a> {
     clock: Clock,
     transmitter: &'a Cell<Sticks>,
-    lights: &'a Cell<ControlState>,
+    lights: Option<&'a Cell<ControlState>>,
     meaning: StickParameters,
     acro: bool,
     eye: Eye,
@@ -74,17 +74,22 @@ pub struct Pilot<'a> {
 }
 
 impl<'a> Pilot<'a> {
-    /// With this transmitter in the hands, and with lights that show this.
+    /// With this transmitter in the hands.
     pub fn new(
         clock: &Clock,
         world: &World,
         transmitter: &'a Cell<Sticks>,
-        lights: &'a Cell<ControlState>,
         meaning: StickParameters,
         acro: bool,
     ) -> Self {
         let eye = Eye::new(world, clock.now());
-        Self { clock: clock.clone(), transmitter, lights, meaning, acro, eye, hand: Hand::default() }
+        Self { clock: clock.clone(), transmitter, lights: None, meaning, acro, eye, hand: Hand::default() }
+    }
+
+    /// Sees lights that show this, too. One who does not takes every gesture for understood.
+    #[must_use]
+    pub fn with_lights(self, lights: &'a Cell<ControlState>) -> Self {
+        Self { lights: Some(lights), ..self }
     }
 
     /// Flies it. Without a place to fly to it is made ready and stands.
@@ -113,7 +118,7 @@ impl<'a> Pilot<'a> {
     async fn gesture(&mut self, sticks: Sticks, is_seen: impl Fn(&ControlState) -> bool, seconds: f32) -> bool {
         for _ in 0..TRIES {
             self.hold(sticks, 0.3).await;
-            let seen = is_seen(&self.lights.get());
+            let seen = self.lights.is_none_or(|lights| is_seen(&lights.get()));
             self.hold(Sticks::REST, seconds).await;
             if seen {
                 return true;
