@@ -306,8 +306,8 @@ fn state(card: &Card, id: u16, status: &FlightStatus, cockpit: &dyn Cockpit) -> 
         }
         108 => {
             let [roll, pitch, yaw] = frame::roll_pitch_yaw(&estimate.attitude).map(f32::to_degrees);
-            // Nose down is positive there.
-            empty.i16(roll * 10.0).i16(pitch * -10.0).i16(if yaw < 0.0 { yaw + 360.0 } else { yaw })
+            // Nose down is positive there, and north is 0: half a degree before it is not 360.
+            empty.i16(roll * 10.0).i16(pitch * -10.0).u16((yaw + 360.5) as u16 % 360)
         }
         109 => {
             let up = estimate.position.z * -100.0;

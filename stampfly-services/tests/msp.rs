@@ -105,6 +105,18 @@ fn answers_are_those_that_another_implementation_has_written() {
 }
 
 #[test]
+fn headings_go_round_at_north() {
+    let mut vehicle = Vehicle::standing();
+    for (yaw, heading) in [(0.0, 0), (0.4, 0), (-0.2, 0), (-0.6, 359), (-1.0, 359), (-90.0, 270), (179.8, 180)] {
+        let attitude = Quat::from_euler_angles(0.0, 0.0, f32::to_radians(yaw));
+        vehicle.publish(Id::estimate_state, &StateEstimate { attitude, ..Default::default() });
+        let answer = asked(&mut vehicle, 108, &[]);
+        // Behind the head of three, length, command, roll and pitch.
+        assert_eq!(answer.get(9..11), Some(&i16::to_le_bytes(heading)[..]), "{yaw}");
+    }
+}
+
+#[test]
 fn all_that_multiwiiconf_asks_in_one_piece_is_answered_in_order() {
     let mut vehicle = Vehicle::standing();
     let ids = [116, 111, 112, 113, 114, 100, 115, 101, 102, 103, 104, 105, 106, 107, 109, 110, 253, 254, 108];
