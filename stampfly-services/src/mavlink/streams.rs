@@ -7,7 +7,7 @@ use heapless::Vec;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::Origin;
 use stampfly_types::messages::{Alerts, ArmBlocks, CommandSource, FlightPhase, Validity};
-use stampfly_types::{Duration, Instant, frame};
+use stampfly_types::{Duration, Instant, Quat, frame};
 
 /// A message that is sent again and again.
 #[derive(Clone, Copy)]
@@ -168,6 +168,14 @@ fn local_position(now: Instant, _: &Own, view: &View<'_>) -> Option<Said> {
     Some(data.into())
 }
 
+/// Degrees from north over east, below 360.
+fn heading(attitude: &Quat) -> f32 {
+    let degrees = frame::yaw(attitude).to_degrees();
+    let around = if degrees < 0.0 { degrees + 360.0 } else { degrees };
+    // What is all but north is rounded up to it.
+    if around < 360.0 { around } else { 0.0 }
+}
+
 /// Only of a vehicle that knows, or was told, where on Earth it is.
 fn global_position(now: Instant, own: &Own, view: &View<'_>) -> Option<Said> {
     let origin = own.origin?;
@@ -179,8 +187,7 @@ fn global_position(now: Instant, own: &Own, view: &View<'_>) -> Option<Said> {
         (estimate.position.into(), estimate.velocity.into());
     let (lat, lon) = origin.global([north, east]);
     let up = (-down * 1e3) as i32;
-    let degrees = frame::yaw(&estimate.attitude).to_degrees();
-    let heading = if degrees < 0.0 { degrees + 360.0 } else { degrees };
+    let heading = heading(&estimate.attitude);
     Some(
         GLOBAL_POSITION_INT_DATA {
             time_boot_ms: ms(now),
@@ -229,8 +236,7 @@ fn motors(now: Instant, _: &Own, view: &View<'_>) -> Option<Said> {
 
 fn hud(_: Instant, _: &Own, view: &View<'_>) -> Option<Said> {
     let (_, estimate) = view.estimate()?;
-    let degrees = frame::yaw(&estimate.attitude).to_degrees();
-    let heading = if degrees < 0.0 { degrees + 360.0 } else { degrees };
+    let heading = heading(&estimate.attitude);
     let throttle = view.motors().map_or(0.0, |(_, motors)| motors.duty.iter().take(4).sum::<f32>() / 4.0);
     Some(
         VFR_HUD_DATA {
@@ -416,4 +422,17 @@ pub(super) fn text(severity: MavSeverity, kind: &str, words: &str) -> Said {
         *to = from;
     }
     STATUSTEXT_DATA { severity, text: bytes.into(), ..Default::default() }.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_go_round_at_north() {
+        for (yaw, expected) in [(0.0, 0.0), (-1e-7, 0.0), (-90.0, 270.0), (-0.5, 359.5), (179.0, 179.0)] {
+            let found = heading(&Quat::from_euler_angles(0.0, 0.0, f32::to_radians(yaw)));
+            assert!((found - expected).abs() < 1e-3 && found < 360.0, "{yaw}: {found}");
+        }
+    }
 }
