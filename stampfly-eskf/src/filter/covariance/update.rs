@@ -34,12 +34,6 @@ impl<const M: usize> Innovation<M> {
         &self.whitened
     }
 
-    /// What the measurement takes from the variance of a state.
-    fn taken(&self, state: usize) -> f32 {
-        let (block, axis) = place(state);
-        self.gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
-    }
-
     /// How far the measurement moves each state.
     pub(crate) fn correction(&self) -> [f32; N] {
         core::array::from_fn(|state| {
@@ -181,9 +175,7 @@ impl Covariance {
         }
         // Bits instead of comparisons, two instructions less for each: the first one of a negative number is set. One that is zero is lifted to
         // its floor in the next step.
-        if self.variances().fold(0, |bits, variance| bits | variance.to_bits()) > i32::MAX as u32
-            && self.repair(innovation)
-        {
+        if self.variances().fold(0, |bits, variance| bits | variance.to_bits()) > i32::MAX as u32 && self.repair(gain) {
             return None;
         }
         let mut correction = [Lanes::zero(); BLOCKS];
@@ -194,22 +186,27 @@ impl Covariance {
         Some([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o])
     }
 
-    /// Replaces variances of which more was taken than there is. Was it more than rounding can take? Then nothing has been learnt.
-    // Hardly ever.
+    /// Replaces variances of which this gain has taken more than there was. Was it more than rounding can take? Then nothing has been learnt.
+    // Hardly ever, and one for all numbers of axes.
     #[cold]
     #[inline(never)]
-    fn repair<const M: usize>(&mut self, innovation: &Innovation<M>) -> bool {
-        let before: [f32; N] = core::array::from_fn(|state| self.get(state, state) + innovation.taken(state));
-        let states = || before.into_iter().enumerate();
-        let is_rounding = |(state, before): (usize, f32)| self.get(state, state) >= -ROUNDING * before;
+    fn repair(&mut self, gain: &[Row]) -> bool {
+        let taken: [f32; N] = core::array::from_fn(|state| {
+            let (block, axis) = place(state);
+            gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
+        });
+        let states = || taken.into_iter().enumerate();
         // What has overflowed is no number, and that is not rounding either.
-        let cannot_be = !states().all(is_rounding);
-        for (state, before) in states() {
+        let cannot_be =
+            !states().all(|(state, taken)| self.get(state, state) >= -ROUNDING * (self.get(state, state) + taken));
+        for (state, taken) in states() {
+            let left = self.get(state, state);
+            let before = left + taken;
             if cannot_be {
-                // So much was taken that what there was is lost.
-                let is_left = before.is_finite() && before > ROUNDING * innovation.taken(state);
-                self.reset(state, if is_left { before } else { LOST });
-            } else if self.get(state, state) <= 0.0 {
+                // So much may have been taken that what there was is lost.
+                let is_known = before.is_finite() && before > ROUNDING * taken;
+                self.reset(state, if is_known { before } else { LOST });
+            } else if left <= 0.0 {
                 self.reset(state, ROUNDING * before);
             }
         }
