@@ -158,7 +158,6 @@ async fn convert(clock: Clock, world: World, parameters: BatteryParameters, mut 
 #[derive(Default)]
 struct Seen {
     attitude: Attitude,
-    state: ControlState,
     /// It may be armed.
     ready: bool,
     input: ReceiverInput,
@@ -184,7 +183,7 @@ pub struct Around<'a> {
 
 impl Around<'_> {
     fn look(&mut self, now: Instant, truth: &Truth) {
-        let (state, stays) = (self.seen.state, self.progress.stays.get());
+        let (state, stays) = (self.lights.get(), self.progress.stays.get());
         let is_last = self.progress.legs.get() == self.outcome.legs[1];
         let shown = Shown {
             ready: self.seen.ready,
@@ -244,16 +243,13 @@ impl vehicle::Around for Around<'_> {
         let seen = &mut self.seen;
         match Id::ALL.get(topic) {
             Some(Id::attitude) => seen.attitude = message(words).unwrap_or(seen.attitude),
-            Some(Id::control_state) => {
-                seen.state = message(words).unwrap_or(seen.state);
-                self.lights.set(seen.state);
-            }
+            Some(Id::control_state) => self.lights.set(message(words).unwrap_or(self.lights.get())),
             Some(Id::flight_status) => {
                 seen.ready = message(words).is_some_and(|status: FlightStatus| status.blocks.is_empty());
             }
             Some(Id::receiver_input) => {
                 seen.input = message(words).unwrap_or(seen.input);
-                seen.packets += u32::from(seen.state.armed);
+                seen.packets += u32::from(self.lights.get().armed);
             }
             _ => {}
         }
@@ -267,7 +263,8 @@ impl vehicle::Around for Around<'_> {
 
     fn progress(&self) -> (f32, &'static str) {
         let [_, legs] = self.outcome.legs;
-        let word = match (self.seen.state.armed, self.seen.state.calibrating) {
+        let ControlState { armed, calibrating, .. } = self.lights.get();
+        let word = match (armed, calibrating) {
             (true, _) => "flying",
             (false, true) => "calibrating",
             (false, false) => "on the ground",
@@ -284,11 +281,11 @@ impl vehicle::Around for Around<'_> {
     }
 
     fn finish(self) -> Outcome {
-        let Self { seen, mut outcome, progress, spectator, wrong, setup, .. } = self;
+        let Self { seen, lights, mut outcome, progress, spectator, wrong, setup, .. } = self;
         outcome.finished = progress.finished.get();
         outcome.live = self.setup.live.is_some();
         outcome.legs[0] = progress.legs.get();
-        outcome.end(&setup.faults, Some(&wrong.injector), spectator.truth(), seen.state.armed);
+        outcome.end(&setup.faults, Some(&wrong.injector), spectator.truth(), lights.get().armed);
         let seconds = f64::from(seen.looks) * LOOK.seconds_f64();
         outcome.measured.packets = (seconds > 0.0).then(|| f64::from(seen.packets) / seconds);
         outcome
