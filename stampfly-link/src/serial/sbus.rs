@@ -170,20 +170,20 @@ impl SbusDecoder {
     #[inline]
     pub fn feed(&mut self, at: Instant, byte: u8) -> Option<SbusFrame> {
         self.pause(at);
-        if self.heard.put_inside(byte) { None } else { self.first_or_last(byte) }
-    }
-
-    /// The first byte or the last one of what may be a frame.
-    // Apart, so that the other 23 fall through to the loop that feeds them.
-    #[cold]
-    #[inline(never)]
-    fn first_or_last(&mut self, byte: u8) -> Option<SbusFrame> {
-        // What does not begin as a frame is none.
-        if self.heard.is_empty() && byte != START {
-            self.heard.skip(1);
+        if self.heard.put_inside(byte) {
             return None;
         }
-        if self.heard.push(byte) { self.ended() } else { None }
+        if self.heard.is_empty() {
+            // What does not begin as a frame is none.
+            if byte == START {
+                self.heard.push(byte);
+            } else {
+                self.heard.skip(1);
+            }
+            return None;
+        }
+        self.heard.push(byte);
+        self.ended()
     }
 
     /// Takes bytes off the front of `bytes`, which came together and the last one at `at`, and returns the frame that they end. `None`
