@@ -8,7 +8,7 @@ use crate::topics::{Id, LinkEnds};
 use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
 use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, PilotInput};
-use stampfly_types::{Duration, Instant, Message};
+use stampfly_types::{Duration, Instant, Message, Stamped};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
 pub const PERIOD: Duration = Duration::from_millis(20);
@@ -53,7 +53,7 @@ impl<'b> Link<'b> {
     }
 
     /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with the key has sent is returned,
-    /// for a `Desk` of `stampfly-services`, whose answers `guarded` seals.
+    /// for a `RadioDesk` of `stampfly-services`, whose answers `guarded` seals.
     ///
     /// # Errors
     /// When it is refused. The session has counted it; nothing is published.
@@ -102,6 +102,11 @@ impl<'b> Link<'b> {
         self.ends.command_pilot.publish(at, input);
     }
 
+    /// The newest telemetry.
+    pub fn telemetry(&mut self) -> Option<Stamped<TelemetryFrame>> {
+        self.ends.telemetry.latest()
+    }
+
     /// Follows the mode machine, and returns what is to be sent now, and where. `random` are eight new bytes of a generator.
     pub fn transmit<'r>(
         &mut self,
@@ -123,7 +128,7 @@ impl<'b> Link<'b> {
             }
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
-                let (at, frame) = self.ends.telemetry.latest().map(|new| (new.at, new.data)).unwrap_or_default();
+                let (at, frame) = self.telemetry().map(|new| (new.at, new.data)).unwrap_or_default();
                 let packet = packet(self.counter, &frame);
                 if let Some(peer) = self.guarded.open_peer(now) {
                     return Some((peer, put(room, &packet.to_bytes())?));

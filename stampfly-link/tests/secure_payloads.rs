@@ -77,6 +77,7 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
             Instant::from_micros(at),
             words
         ))),
+        any::<u16>().prop_map(|fingerprint| Payload::Tables { fingerprint }),
         (any::<u32>(), any::<bool>()).prop_map(|(counter, taken)| Payload::Acknowledgement { counter, taken }),
     ]
 }

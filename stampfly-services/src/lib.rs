@@ -6,6 +6,7 @@
 //! | [`cockpit`] | what a service sees of a vehicle, and what it may ask for |
 //! | [`helm`] | the part of a cockpit that is the same for every vehicle |
 //! | [`desk`] | a station's questions for parameters, and its lines of the console |
+//! | [`radio_desk`] | the same over the secure link, and topics that a station wants to see |
 //! | [`Requested`] | parameters of a vehicle that takes requests for them |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
@@ -41,6 +42,7 @@ pub mod mission;
 pub mod msp;
 #[cfg(feature = "mavlink")]
 pub mod network;
+pub mod radio_desk;
 mod refusal;
 mod requested;
 pub mod tape;
@@ -48,12 +50,14 @@ pub mod telemetry;
 pub mod tello;
 mod version;
 pub mod view;
+mod watches;
 
 pub use cockpit::{Cockpit, Request};
 pub use data_stream::DataStream;
 pub use desk::Desk;
 pub use helm::{Hands, Helm, Seated};
 pub use lease::Lease;
+pub use radio_desk::RadioDesk;
 pub use refusal::{Refusal, Seat};
 pub use requested::Requested;
 pub use tape::Tape;

@@ -62,7 +62,8 @@ use stampfly_drivers::Timebase;
 use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, Policy};
-use stampfly_services::Desk;
+use stampfly_services::RadioDesk;
+use stampfly_services::cable::fingerprint;
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -196,16 +197,18 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             button: outside.button_pin,
         });
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
-        static DESK: StaticCell<RefCell<Desk>> = StaticCell::new();
-        let desk: &'static _ = DESK.init_with(RefCell::default);
+        static DESK: StaticCell<RefCell<RadioDesk>> = StaticCell::new();
+        let tables = fingerprint(&topics::TOPICS, &config);
+        let desk: &'static _ = DESK.init_with(|| RefCell::new(RadioDesk::new(tables)));
         let link = radio::link(peer, key.clone(), policy, outside.link);
         let radio = Box::new(radio::Parts {
             unit: chip.WIFI,
             link,
             desk,
             taken,
+            memory,
             #[cfg(feature = "wifi")]
-            network: (network, memory),
+            network,
         });
         let console = Box::new(console::Parts {
             memory,

@@ -10,7 +10,6 @@
 
 use crate::channel::CHANNEL;
 use crate::clock::Clock;
-#[cfg(feature = "wifi")]
 use crate::memory::Memory;
 use crate::record::{Line, Taken};
 use crate::storage::KEY_ID;
@@ -35,7 +34,8 @@ use stampfly_board::topics;
 use stampfly_drivers::Timebase;
 use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
-use stampfly_services::desk::{Desk, Letter};
+use stampfly_services::desk::Letter;
+use stampfly_services::radio_desk::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioDesk, Words};
 use stampfly_services::tape::RADIO_CHUNKS;
 use static_cell::StaticCell;
 
@@ -47,12 +47,14 @@ pub struct Parts {
     pub unit: WIFI<'static>,
     pub link: &'static RefCell<Link<'static>>,
     /// What a station with the key asks besides flying.
-    pub desk: &'static RefCell<Desk>,
+    pub desk: &'static RefCell<RadioDesk>,
     /// The flight record.
     pub taken: &'static RefCell<Taken>,
-    /// What the radio joins while disarmed, and what says whether it is.
+    /// The newest samples, and whether the vehicle is armed.
+    pub memory: &'static RefCell<Memory>,
+    /// What the radio joins while disarmed.
     #[cfg(feature = "wifi")]
-    pub network: (&'static RefCell<Network>, &'static RefCell<Memory>),
+    pub network: &'static RefCell<Network>,
 }
 
 /// Answers of the desk, which the console's task makes: sealed right before they are sent, so that no frame overtakes another.
@@ -83,6 +85,7 @@ pub async fn run(parts: Box<Parts>) {
         link,
         desk,
         taken,
+        memory,
         #[cfg(feature = "wifi")]
         network,
     } = *parts;
@@ -99,19 +102,19 @@ pub async fn run(parts: Box<Parts>) {
     {
         link.borrow_mut().guarded.set_vehicle(Vehicle::new(key));
     }
+    let waiting = Waiting { taken, desk, memory };
     #[cfg(feature = "wifi")]
     {
-        let (network, memory) = network;
         let mut seed = [0; 8];
         random.read(&mut seed);
         let air = wifi::start(network, u64::from_le_bytes(seed));
         let say = Say { sender, manager: &manager, network };
         let in_the_network =
             join(wifi::carry(air, network, link, desk), wifi::associate(controller, &manager, network, memory));
-        join3(receive(receiver, link, desk), send(say, &random, (link, taken)), in_the_network).await;
+        join3(receive(receiver, link, desk), send(say, &random, link, waiting), in_the_network).await;
     }
     #[cfg(not(feature = "wifi"))]
-    join(receive(receiver, link, desk), send(Say { sender, manager: &manager }, &random, (link, taken))).await;
+    join(receive(receiver, link, desk), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
 }
 
 /// A new key, which is also handed on to be stored.
@@ -123,7 +126,7 @@ fn make(random: &Trng) -> Option<Key> {
     Some(key)
 }
 
-async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &RefCell<Desk>) {
+async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &RefCell<RadioDesk>) {
     let mut room = [0; MAX_FRAME];
     loop {
         let received = receiver.receive_async().await;
@@ -131,15 +134,35 @@ async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &
         // What is longer is no frame of anybody's. What is refused is counted there.
         if let Some(frame) = room.get_mut(..received.data().len()) {
             frame.copy_from_slice(received.data());
-            if let Ok(Some(received)) = link.borrow_mut().receive(Clock.now(), source, frame) {
+            let now = Clock.now();
+            if let Ok(Some(received)) = link.borrow_mut().receive(now, source, frame) {
                 // A station asks again for what there is no room for.
-                let _ = desk.borrow_mut().ask(0, &received.payload);
+                let _ = desk.borrow_mut().ask(now, &received.payload);
             }
         }
     }
 }
 
-async fn send(mut say: Say<'_>, random: &Trng, (link, taken): (&RefCell<Link<'_>>, &RefCell<Taken>)) {
+/// Where there may be something for a station that has asked for it.
+struct Waiting {
+    taken: &'static RefCell<Taken>,
+    desk: &'static RefCell<RadioDesk>,
+    memory: &'static RefCell<Memory>,
+}
+
+impl Waiting {
+    /// Seals what is due of the topics that the station watches.
+    // Apart: its room is not kept while something is sent.
+    #[inline(never)]
+    fn sample<'r>(&self, link: &RefCell<Link<'_>>, room: &'r mut [u8; MAX_FRAME]) -> Option<(Address, &'r [u8])> {
+        let (now, mut words): (_, Words) = (Clock.now(), [[0; 4]; _]);
+        let (mut desk, memory) = (self.desk.borrow_mut(), self.memory.borrow());
+        let payload = desk.next(now, &memory.newest, &mut words)?;
+        link.borrow_mut().guarded.seal(now, &payload, room)
+    }
+}
+
+async fn send(mut say: Say<'_>, random: &Trng, link: &RefCell<Link<'_>>, waiting: Waiting) {
     let mut ticker = Ticker::every(Duration::from_micros(link::PERIOD.as_micros()));
     let mut room = [0; MAX_FRAME];
     loop {
@@ -160,9 +183,14 @@ async fn send(mut say: Say<'_>, random: &Trng, (link, taken): (&RefCell<Link<'_>
                 let _ = say.say(to, bytes).await;
             }
         }
+        let samples = if say.is_network(link.borrow().guarded.station()) { NETWORK_SAMPLES } else { RADIO_SAMPLES };
+        for _ in 0..samples {
+            let Some((to, bytes)) = waiting.sample(link, &mut room) else { break };
+            let _ = say.say(to, bytes).await;
+        }
         for _ in 0..RADIO_CHUNKS {
             let sealed = {
-                let (mut taken, mut chunk) = (taken.borrow_mut(), [0; MAX_BODY]);
+                let (mut taken, mut chunk) = (waiting.taken.borrow_mut(), [0; MAX_BODY]);
                 let Some(chunk) = taken.chunk(Line::Radio, &mut chunk, LEAST_CHUNK) else { break };
                 link.borrow_mut().guarded.seal(Clock.now(), &Payload::Chunk(chunk), &mut room)
             };
@@ -182,6 +210,17 @@ struct Say<'s> {
 }
 
 impl Say<'_> {
+    /// Is that station in the network?
+    #[cfg(feature = "wifi")]
+    fn is_network(&self, station: Option<Address>) -> bool {
+        station.is_some_and(|station| self.network.borrow().knows(station))
+    }
+
+    #[cfg(not(feature = "wifi"))]
+    fn is_network(&self, _: Option<Address>) -> bool {
+        false
+    }
+
     async fn say(&mut self, to: Address, bytes: &[u8]) -> Result<(), EspNowError> {
         #[cfg(feature = "wifi")]
         if self.network.borrow_mut().send_sealed(to, bytes) {

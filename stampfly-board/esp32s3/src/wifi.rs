@@ -23,7 +23,7 @@ use stampfly_board::link::Link;
 use stampfly_drivers::Timebase;
 use stampfly_link::Address;
 use stampfly_link::secure::Heard;
-use stampfly_services::Desk;
+use stampfly_services::RadioDesk;
 use stampfly_services::association::{Association, Credentials, Event, State, Step};
 use stampfly_services::network::{self, Door, Routes, Stack};
 use stampfly_types::Instant;
@@ -78,6 +78,11 @@ impl Network {
     pub fn show(&self) -> Shown<'_> {
         let address = self.stack.as_ref().and_then(Stack::address).filter(|_| self.association.is_joined());
         Shown { known: self.known.as_ref(), state: self.association.state(), signal: self.signal, address }
+    }
+
+    /// Is that the address of a station in the network?
+    pub fn knows(&self, station: Address) -> bool {
+        self.routes.place(station).is_some()
     }
 
     /// Sends a frame of the secure link, if it is for somebody in the network. `false`: it is for the radio.
@@ -164,7 +169,7 @@ impl Device for Air {
 /// The radio's link and desk, as the network sees them.
 struct Behind {
     link: &'static RefCell<Link<'static>>,
-    desk: &'static RefCell<Desk>,
+    desk: &'static RefCell<RadioDesk>,
 }
 
 impl Door for Behind {
@@ -178,7 +183,7 @@ impl Door for Behind {
             && let Some(received) = link.obey(now, received)
         {
             // A station asks again for what there is no room for.
-            let _ = self.desk.borrow_mut().ask(0, &received.payload);
+            let _ = self.desk.borrow_mut().ask(now, &received.payload);
         }
     }
 }
@@ -199,7 +204,7 @@ pub async fn carry(
     mut air: Air,
     network: &RefCell<Network>,
     link: &'static RefCell<Link<'static>>,
-    desk: &'static RefCell<Desk>,
+    desk: &'static RefCell<RadioDesk>,
 ) {
     let mut ticker = Ticker::every(TURN);
     let mut door = Behind { link, desk };

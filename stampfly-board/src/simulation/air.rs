@@ -24,7 +24,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::vec::Vec;
 
-const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
+pub(super) const VEHICLE: Address = Address([0x34, 0x85, 0x18, 1, 2, 3]);
 const TRANSMITTER: Address = Address([2, 0, 0, 0, 0, 1]);
 /// Stream of the random numbers on the air; no model has this number.
 const STREAM: u64 = 105;

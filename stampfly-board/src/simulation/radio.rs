@@ -2,17 +2,20 @@
 
 use super::air;
 use super::faults::Wrong;
+use crate::link::Link;
 use crate::messages::TelemetryFrame;
 use crate::topics::{self, Id};
-use stampfly_link::secure::Payload;
+use stampfly_link::Session;
+use stampfly_link::secure::{Guarded, Payload, Policy};
 use stampfly_sim::fault::Line;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
+use std::boxed::Box;
 
 /// How a station's words come to the vehicle.
 enum Way<'b> {
-    /// As messages, straight to the bus.
-    Direct(topics::LinkEnds<'b>),
+    /// As messages, straight to the bus; beside it, frames of whoever has a key, if there is one.
+    Direct(Box<Link<'b>>),
     /// As bytes of the secure session.
     Sealed(air::Shared<'b>),
 }
@@ -35,7 +38,9 @@ impl<'b> Radio<'b> {
     }
 
     pub(super) fn new(clock: &Clock, ends: topics::LinkEnds<'b>, wrong: &Wrong) -> Self {
-        Self::by(clock, Way::Direct(ends), wrong)
+        let session = Session::new(air::VEHICLE, 1, None);
+        let link = Link::new(Guarded::new(None, session, Policy::default()), ends);
+        Self::by(clock, Way::Direct(Box::new(link)), wrong)
     }
 
     /// One that carries the bytes of the secure session.
@@ -54,6 +59,14 @@ impl<'b> Radio<'b> {
         }
     }
 
+    /// The firmware's end of the radio, which also hears frames of stations with this key. `None` where a simulated station has it.
+    pub(super) fn link(&mut self) -> Option<&mut Link<'b>> {
+        match &mut self.way {
+            Way::Direct(link) => Some(link),
+            Way::Sealed(_) => None,
+        }
+    }
+
     /// Virtual time.
     #[must_use]
     pub fn clock(&self) -> &Clock {
@@ -66,7 +79,7 @@ impl<'b> Radio<'b> {
         let now = self.clock.now();
         let arrived = self.guided.pass(now, &command);
         match &mut self.way {
-            Way::Direct(ends) => arrived.is_none_or(|command| ends.command_guided.publish(now, command).is_ok()),
+            Way::Direct(link) => arrived.is_none_or(|command| link.command(now, command)),
             Way::Sealed(air) => {
                 let sent = Payload::Guided(arrived.unwrap_or(command));
                 air.borrow_mut().say(now, &sent, arrived.is_some())
@@ -79,9 +92,9 @@ impl<'b> Radio<'b> {
         let now = self.clock.now();
         let arrived = self.pilot.pass(now, input);
         match &mut self.way {
-            Way::Direct(ends) => {
+            Way::Direct(link) => {
                 if let Some(input) = arrived {
-                    ends.command_pilot.publish(now, &input);
+                    link.sticks(now, &input);
                 }
             }
             Way::Sealed(air) => {
@@ -95,8 +108,8 @@ impl<'b> Radio<'b> {
     pub fn telemetry(&mut self) -> TelemetryFrame {
         let now = self.clock.now();
         match &mut self.way {
-            Way::Direct(ends) => {
-                let newest = ends.telemetry.latest();
+            Way::Direct(link) => {
+                let newest = link.telemetry();
                 if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data)) {
                     self.frame = frame;
                 }

@@ -1,8 +1,10 @@
-//! `stampfly connect`: the ground station of a real vehicle, at a serial port or behind TCP.
+//! `stampfly connect`: the ground station of a real vehicle, at a serial port, behind TCP or in a Wi-Fi network.
 //!
 //! | part | what it does |
 //! |---|---|
 //! | [`Place`] | where the line is, and how it is opened |
+//! | `sealed.rs` | a line of sealed frames, for a vehicle in a network |
+//! | `translation.rs` | what a cable says and what those frames say |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
 //! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
 //!
@@ -11,7 +13,9 @@
 mod log;
 mod place;
 mod record;
+mod sealed;
 pub mod station;
+mod translation;
 
 pub use place::{Line, Place, PlaceError};
 
@@ -23,6 +27,7 @@ use stampfly_ground::ask::Ask;
 use stampfly_ground::{Event, Hub, Watch};
 use stampfly_link::mavlink::MavlinkDecoder;
 use stampfly_link::mavlink::dialects::common::MavMessage;
+use stampfly_link::secure::Key;
 use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
 use station::{Said, Station};
 use std::collections::{BTreeMap, HashMap};
@@ -95,6 +100,7 @@ pub struct Carried {
 pub struct Bridge<V: Vehicle> {
     place: Place,
     baud: u32,
+    key: Option<Key>,
     station: Station,
     ends: Ends<V>,
     state: State,
@@ -216,7 +222,13 @@ impl<V: Vehicle> Bridge<V> {
             clock: stampfly_types::Instant::ZERO,
             restarted: false,
         };
-        Some(Self { place, baud, station, ends, state: State::Up, shown: BTreeMap::new() })
+        Some(Self { place, baud, key: None, station, ends, state: State::Up, shown: BTreeMap::new() })
+    }
+
+    /// The same, with the key of a vehicle that speaks in sealed frames.
+    #[must_use]
+    pub fn with_key(self, key: Key) -> Self {
+        Self { key: Some(key), station: self.station.by_radio(), ..self }
     }
 
     /// The same, which asks the vehicle for its compact flight record and writes it into a file.
@@ -232,7 +244,7 @@ impl<V: Vehicle> Bridge<V> {
     pub fn run(mut self, until: Option<Instant>) -> Carried {
         let mut was_heard = false;
         while !self.ends.ports.are_closed() && until.is_none_or(|until| Instant::now() < until) {
-            match self.place.open(self.baud) {
+            match self.place.open(self.baud, self.key.as_ref()) {
                 Ok(line) => {
                     let why = self.carry(line, until);
                     was_heard |= self.station.heard().is_some();

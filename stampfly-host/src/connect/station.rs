@@ -108,6 +108,7 @@ pub struct Station {
     words: Vec<u32>,
     /// When a sound frame came.
     heard: Option<Instant>,
+    by_radio: bool,
 }
 
 impl Station {
@@ -133,7 +134,14 @@ impl Station {
             is_foreign: false,
             words: Vec::new(),
             heard: None,
+            by_radio: false,
         }
+    }
+
+    /// The same for a vehicle on the secure link: while it is armed, some questions are refused there, and that is silence.
+    #[must_use]
+    pub fn by_radio(self) -> Self {
+        Self { by_radio: true, ..self }
     }
 
     /// When a sound frame came last.
@@ -365,26 +373,35 @@ impl Station {
     /// Answers what has waited too long, or without a time everything.
     fn expire(&mut self, now: Option<Instant>, tell: Tell<'_>) {
         let late = |since: Instant| now.is_none_or(|now| now.duration_since(since) > PATIENCE);
-        let silent = || match now {
-            Some(_) => Err("the vehicle does not answer".into()),
-            None => Err("the line to the vehicle is gone".into()),
+        let by_radio = self.by_radio;
+        let silent = |asked: &Asked| match (now, &asked.ask) {
+            (None, _) => Err("the line to the vehicle is gone".into()),
+            (Some(_), Ask::Console { .. } | Ask::ParamSave {} | Ask::ParamSet { .. }) if by_radio => {
+                Err("the vehicle does not answer; by radio it does this only while it is disarmed".into())
+            }
+            (Some(_), _) => Err("the vehicle does not answer".into()),
         };
         let numbers: Vec<u16> =
             self.waiting.iter().filter(|(_, (_, since))| late(*since)).map(|(number, _)| *number).collect();
         for number in numbers {
             match self.waiting.remove(&number) {
-                Some((Why::Page(client, asked), _)) => tell(Said::Answer(client, asked, silent())),
+                Some((Why::Page(client, asked), _)) => {
+                    let answer = silent(&asked);
+                    tell(Said::Answer(client, asked, answer));
+                }
                 // Once more, if it is still wanted.
                 Some((Why::List(index), _)) if now.is_some() => self.next = self.next.min(index),
                 _ => {}
             }
         }
         if let Some((Typed { client, asked, .. }, _)) = self.line.take_if(|(_, since)| late(*since)) {
-            tell(Said::Answer(client, asked, silent()));
+            let answer = silent(&asked);
+            tell(Said::Answer(client, asked, answer));
         }
         while self.motor.front().is_some_and(|(_, _, since)| late(*since)) {
             if let Some((client, asked, _)) = self.motor.pop_front() {
-                tell(Said::Answer(client, asked, silent()));
+                let answer = silent(&asked);
+                tell(Said::Answer(client, asked, answer));
             }
         }
         if now.is_none() {

@@ -1,5 +1,6 @@
-//! The key with which MAVLink is signed at ports that others can reach.
+//! The key of a vehicle: with it MAVLink is signed at ports that others can reach, and frames are sealed.
 
+use stampfly_link::secure;
 use stampfly_sim::vehicle::Signing;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -7,6 +8,8 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Signatures count time from 2015, in units of 10 µs.
 const EPOCH: Duration = Duration::from_secs(1_420_070_400);
+/// The number of a key that has none: the firmware gives its own this one.
+const KEY_ID: u8 = 1;
 
 /// A key. Is not printed.
 ///
@@ -24,6 +27,7 @@ const EPOCH: Duration = Duration::from_secs(1_420_070_400);
 #[derive(Clone, PartialEq, Eq)]
 pub struct Key {
     bytes: [u8; 32],
+    id: u8,
     everywhere: bool,
 }
 
@@ -46,7 +50,10 @@ impl fmt::Display for KeyError {
         let path = self.path.display();
         match &self.error {
             Some(error) => write!(f, "{path}: {error}"),
-            None => write!(f, "{path}: a key is 64 hexadecimal digits; 'openssl rand -hex 32 > {path}' makes one"),
+            None => write!(
+                f,
+                "{path}: a key is 64 hexadecimal digits, or the text that a vehicle's 'key' shows; 'openssl rand -hex 32 > {path}' makes one"
+            ),
         }
     }
 }
@@ -58,7 +65,7 @@ impl std::error::Error for KeyError {
 }
 
 impl Key {
-    /// Reads a file whose first word is the key: what comes after it, as `sha256sum` writes a name, is passed over.
+    /// Reads a file whose first word is the key, as digits or as the text that a vehicle's `key` shows: what comes after it, as `sha256sum` writes a name, is passed over.
     ///
     /// # Errors
     /// When it cannot be read, or is no key.
@@ -69,6 +76,9 @@ impl Key {
     }
 
     fn parse(digits: &str) -> Option<Self> {
+        if let Ok(key) = secure::Key::from_uri(digits) {
+            return Some(Self { bytes: *key.bytes(), id: key.id(), everywhere: false });
+        }
         let mut key = [0; 32];
         if digits.len() != 2 * key.len() || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
             return None;
@@ -76,7 +86,7 @@ impl Key {
         for (place, byte) in key.iter_mut().enumerate() {
             *byte = u8::from_str_radix(digits.get(2 * place..2 * place + 2)?, 16).ok()?;
         }
-        Some(Self { bytes: key, everywhere: false })
+        Some(Self { bytes: key, id: KEY_ID, everywhere: false })
     }
 
     /// The same, which is asked for at the ports of this machine, too.
@@ -91,6 +101,14 @@ impl Key {
         self.everywhere
     }
 
+    /// The same for sealed frames.
+    ///
+    /// # Errors
+    /// When all its bytes are the same.
+    pub fn sealing(&self) -> Result<secure::Key, secure::KeyError> {
+        secure::Key::generate(self.id, self.bytes)
+    }
+
     /// The key, and the present time.
     #[must_use]
     pub fn signing(&self) -> Signing {
@@ -102,6 +120,16 @@ impl Key {
 #[cfg(test)]
 mod tests {
     use super::Key;
+    use stampfly_link::secure;
+
+    #[test]
+    fn what_a_vehicle_shows_is_its_key() {
+        let shown = secure::Key::generate(7, core::array::from_fn(|place| place as u8)).expect("random enough");
+        let key = Key::parse(&shown.uri().to_string()).expect("a key");
+        let sealing = key.sealing().expect("a key");
+        assert_eq!((sealing.id(), sealing.bytes()), (7, shown.bytes()));
+        assert_eq!(key.signing().key, *shown.bytes());
+    }
 
     #[test]
     fn a_key_has_64_hexadecimal_digits_and_nothing_else_is_one() {

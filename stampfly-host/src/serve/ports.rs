@@ -116,7 +116,9 @@ impl OpenPorts {
         };
         for (port, spec) in ports.iter().enumerate() {
             let mut socket = None;
-            if let Some(address) = PortOption::place(options, spec, number) {
+            // Without a key nobody can say anything there.
+            let is_of_use = *spec != PortSpec::SEALED || opened.key.is_some();
+            if let Some(address) = PortOption::place(options, spec, number).filter(|_| is_of_use) {
                 let failed = |error| OpenError { name: spec.name, address, why: Why::Failed(error) };
                 if spec.signed && !address.ip().is_loopback() && opened.key.is_none() {
                     return Err(OpenError { name: spec.name, address, why: Why::NoKey });

@@ -71,13 +71,15 @@ pub enum Kind {
     Sample = 0xC0,
     /// A chunk of the flight record.
     Chunk = 0xC1,
+    /// What places in the vehicle's tables mean.
+    Tables = 0xC2,
     /// A frame of the station has been taken, or what is in it refused.
     Acknowledgement = 0xD0,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Join,
         Self::Ready,
         Self::Sticks,
@@ -95,6 +97,7 @@ impl Kind {
         Self::Reply,
         Self::Sample,
         Self::Chunk,
+        Self::Tables,
         Self::Acknowledgement,
     ];
 

@@ -15,6 +15,7 @@
 //! | B0 reply | vehicle | u8 whether it is the last; text |
 //! | C0 sample | vehicle | u16 topic; u64 instant, µs; the words of the message, u32 each |
 //! | C1 chunk | vehicle | a chunk of the flight record, with its number and check sum |
+//! | C2 tables | vehicle | u16 fingerprint of its tables of topics and parameters |
 //! | D0 acknowledgement | vehicle | u32 counter of a frame of the station; u8 whether it was taken |
 //!
 //! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and
@@ -96,6 +97,11 @@ pub enum Payload<'f> {
     Sample(Sample<'f>),
     /// A chunk of the flight record, from the vehicle.
     Chunk(&'f [u8]),
+    /// The fingerprint of the vehicle's tables, from the vehicle: a station whose own is another knows other topics and parameters by the same places.
+    Tables {
+        /// Of both tables.
+        fingerprint: u16,
+    },
     /// What became of a frame of the station, from the vehicle.
     Acknowledgement {
         /// The frame's counter.
@@ -123,6 +129,7 @@ impl<'f> Payload<'f> {
             Self::Reply { .. } => Kind::Reply,
             Self::Sample(_) => Kind::Sample,
             Self::Chunk(_) => Kind::Chunk,
+            Self::Tables { .. } => Kind::Tables,
             Self::Acknowledgement { .. } => Kind::Acknowledgement,
         }
     }
@@ -179,6 +186,7 @@ impl<'f> Payload<'f> {
             }
             Self::Record { wanted } => to.truth(*wanted)?,
             Self::Chunk(chunk) => to.bytes(chunk)?,
+            Self::Tables { fingerprint } => to.bytes(&fingerprint.to_le_bytes())?,
             Self::Telemetry(packet) => to.bytes(&packet.to_bytes())?,
             Self::Parameter { index, value, taken } => {
                 to.bytes(&index.to_le_bytes())?;
@@ -237,6 +245,7 @@ impl<'f> Payload<'f> {
             }
             Kind::Record => Self::Record { wanted: from.truth()? },
             Kind::Chunk => Self::Chunk(core::mem::take(&mut from.0)),
+            Kind::Tables => Self::Tables { fingerprint: u16::from_le_bytes(from.bytes()?) },
             Kind::Telemetry => Self::Telemetry(TelemetryPacket::decode(&from.bytes::<22>()?).ok()?),
             Kind::Parameter => {
                 let (index, value) = (u16::from_le_bytes(from.bytes()?), from.number(f32::MAX)?);

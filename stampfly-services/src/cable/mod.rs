@@ -5,18 +5,16 @@
 //! |---|---|
 //! | `split.rs` | which bytes are text, and which are frames |
 //! | `envelope.rs` | payloads of the secure link in `TUNNEL` |
-//! | `watches.rs` | the topics that the station wants to see |
 //!
 //! The vehicle says nothing in MAVLink until it has heard a frame, and no more [30 s](crate::mavlink) after the last: a terminal shows text alone. For lines whose
 //! other end is in reach, such as USB: nobody is authenticated.
 
 mod envelope;
 mod split;
-mod watches;
 
+pub use crate::watches::Watches;
 pub use envelope::{Assembly, BODY, Envelope, PART, TUNNEL, TYPE, fingerprint};
 pub use split::{PAUSE, Part, Split};
-pub use watches::Watches;
 
 use crate::cockpit::Cockpit;
 use crate::desk::{Answer, Desk, Room};

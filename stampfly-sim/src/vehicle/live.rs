@@ -80,6 +80,8 @@ impl PortSpec {
     pub const MAVLINK_TCP: Self =
         Self { signed: true, ..Self::tcp("mavlink-tcp", 5_760, "MAVLink, for programs that connect") };
 
+    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nobody can, and it is not opened.
+    pub const SEALED: Self = Self::udp("sealed", 14_560, "sealed frames of a station with the key");
     /// Where configurators connect for MSP.
     pub const MSP: Self = Self::tcp("msp", 5_761, "MSP, for configurators");
     /// The same for programs that open a serial port.

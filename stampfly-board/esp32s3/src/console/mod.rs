@@ -50,7 +50,7 @@ use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::Key;
 use stampfly_services::cable::{Cable, fingerprint};
 use stampfly_services::mavlink::Identity;
-use stampfly_services::{Desk, Helm, Places, Seated, View};
+use stampfly_services::{Helm, Places, RadioDesk, Seated, View};
 use stampfly_types::messages::CalibrationReport;
 use static_cell::StaticCell;
 
@@ -95,7 +95,7 @@ pub struct Parts {
     pub key: Option<Key>,
     pub link: &'static RefCell<Link<'static>>,
     /// What a station with the key asks by radio.
-    pub desk: &'static RefCell<Desk>,
+    pub desk: &'static RefCell<RadioDesk>,
     /// The flight record.
     pub taken: &'static RefCell<Taken>,
     /// The network, and the time up to which signatures are reserved.
@@ -255,7 +255,7 @@ pub struct Console {
     unstored_key: Option<Key>,
     link: &'static RefCell<Link<'static>>,
     /// Questions of the station on the radio.
-    desk: &'static RefCell<Desk>,
+    desk: &'static RefCell<RadioDesk>,
     /// The flight record.
     taken: &'static RefCell<Taken>,
     /// Everything that is spoken on the line.

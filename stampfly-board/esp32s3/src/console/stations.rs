@@ -53,7 +53,7 @@ impl Console {
         let Self { cable, desk, taken, frames, .. } = self;
         let (mut taken, mut room, now) = (taken.borrow_mut(), [0; BODY], Clock.now());
         taken.ask(now, Line::Cable, cable.record());
-        taken.ask(now, Line::Radio, desk.borrow_mut().record());
+        taken.ask(now, Line::Radio, desk.borrow_mut().questions.record());
         taken.poll(now);
         while frames.capacity() - frames.len() >= CHUNK
             && let Some(chunk) = taken.chunk(Line::Cable, &mut room, LEAST_CHUNK)
@@ -77,7 +77,7 @@ impl Console {
             let Self { known, config, desk, .. } = self;
             let answered = known.vehicle(config, |vehicle| {
                 let mut room = Room::default();
-                let answer = desk.borrow_mut().answer(now, vehicle, &mut room)?;
+                let answer = desk.borrow_mut().questions.answer(now, vehicle, &mut room)?;
                 Some((Letter::of(&answer.payload), answer.request))
             });
             if let Some((letter, request)) = answered {
@@ -86,7 +86,7 @@ impl Console {
                 }
                 if request != Request::Nothing {
                     let said = self.carry_out(request, false).await;
-                    self.desk.borrow_mut().report(&said);
+                    self.desk.borrow_mut().questions.report(&said);
                 }
             }
         }

@@ -5,6 +5,7 @@
 //! | [`PORTS`] | where programs find it, and what is spoken there |
 //! | `services.rs` | bytes of each port → the service that speaks its language |
 //! | `cable.rs` | what is spoken on USB, as by the firmware |
+//! | `sealed.rs` | the secure link, as by the firmware in a Wi-Fi network |
 //! | `handling.rs` | what somebody does to it with their hands |
 //! | `configurator.rs` | what it is for programs that speak MSP |
 //! | `seats.rs` | what services may ask of the vehicle: its `Hands` |
@@ -17,6 +18,7 @@
 mod cable;
 mod configurator;
 mod handling;
+mod sealed;
 mod seats;
 mod services;
 
@@ -31,6 +33,7 @@ use stampfly_drivers::chip::pmw3901;
 use stampfly_flight::compact::Chunks;
 use stampfly_flight::live::Change;
 use stampfly_link::mavlink::dialects::common::MavType;
+use stampfly_link::secure::MAX_BODY;
 use stampfly_services::cable::BODY;
 use stampfly_services::{DataStream, Places, Tape, Telemetry, View, version};
 use stampfly_sim::ground::About;
@@ -54,6 +57,7 @@ pub const PORTS: &[PortSpec] = &[
     PortSpec::MSP_SERIAL,
     PortSpec { transport: Transport::Terminal, ..PortSpec::tcp("usb", 0, "what a board speaks on USB") },
     PortSpec::tcp("usb-tcp", 5_763, "the same, for programs that connect"),
+    PortSpec::SEALED,
 ];
 
 const TELLO: usize = 3;
@@ -63,6 +67,7 @@ const STREAM: usize = 6;
 const CONSOLE: usize = 7;
 const USB: usize = 10;
 const USB_TCP: usize = 11;
+const SEALED: usize = 12;
 
 /// What it is for programs at its ports.
 const ABOUT: About = About {
@@ -122,9 +127,11 @@ impl Seen {
         let (mut tape, mut waiting) = (self.tape.borrow_mut(), self.chunks.borrow_mut());
         tape.poll(now, chunks);
         let Some(line) = tape.line() else { return waiting.clear() };
+        let (longest, least) = if line.port == SEALED { (MAX_BODY, MAX_BODY - 32) } else { (BODY, LEAST) };
         let mut room = [0; BODY];
+        let Some(room) = room.get_mut(..longest) else { return };
         while waiting.len() < WAITING
-            && let Some(chunk) = tape.chunk(line, chunks, &mut room, LEAST)
+            && let Some(chunk) = tape.chunk(line, chunks, room, least)
         {
             waiting.push_back(chunk.to_vec());
         }

@@ -2,8 +2,9 @@
 
 use super::cable::Cable;
 use super::handling::Handling;
+use super::sealed::Sealed;
 use super::seats::{Board, Controls, obey};
-use super::{ABOUT, CONSOLE, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE, USB, USB_TCP};
+use super::{ABOUT, CONSOLE, SEALED, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE, USB, USB_TCP};
 use crate::VehicleConfig;
 use crate::console::{Newest, Profile};
 use crate::simulation::radio::Radio;
@@ -35,6 +36,7 @@ pub struct Services<'b> {
     health: &'b Healths,
     profile: &'b Profile,
     cables: Vec<(Client, Cable)>,
+    sealed: Sealed,
     tello: Tello<Client>,
     /// Number of the port that a Tello's state is sent to.
     tello_state: Option<u16>,
@@ -54,13 +56,18 @@ impl<'b> Services<'b> {
         (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
     ) -> Self {
         let hands = Board { radio, console, config: config.clone(), told: Told::new(config.clone()), seen };
+        let mut controls = Ground::new(&ABOUT, live, faults, hands);
+        if let Some(signing) = live.ports.signing() {
+            Sealed::open(signing.key, &mut controls);
+        }
         Self {
-            controls: Ground::new(&ABOUT, live, faults, hands),
+            controls,
             seen,
             sensing,
             health,
             profile,
             cables: Vec::new(),
+            sealed: Sealed::new(config),
             tello: Tello::new(),
             tello_state: None,
             telemetry: None,
@@ -144,6 +151,7 @@ impl Link for Services<'_> {
                 self.seen.tape.borrow_mut().ask(now, from, false);
                 self.cables.retain(|(client, _)| *client != from);
             }
+            (SEALED, Heard::Bytes(bytes)) => self.sealed.hear(now, from, bytes, &mut self.controls),
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             (_, heard) => {
                 let (desk, seen) = (self.desk(&newest), self.seen);
@@ -188,6 +196,8 @@ impl Link for Services<'_> {
             return;
         }
         let newest = self.seen.newest.borrow();
+        let desk = self.desk(&newest);
+        self.sealed.poll(now, &mut self.controls, &desk, put);
         self.controls.answer(now, &*newest, put);
         let mut cockpit = self.controls.seated(&*newest);
         let tello_state = self.tello_state;

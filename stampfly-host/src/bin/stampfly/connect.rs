@@ -1,11 +1,11 @@
-//! `stampfly connect`: the ground station's page for a real vehicle, and MAVLink's ports.
+//! `stampfly connect`: the ground station's page for a real vehicle, and at a cable MAVLink's ports.
 
 use crate::arguments::ConnectOptions;
 use crate::doctor::port_of;
 use crate::failure::Failure;
 use stampfly_host::connect::{Bridge, PORTS, Place};
 use stampfly_host::ground::{Hub, Limits, Server, VehicleCard};
-use stampfly_host::serve::{OpenPorts, PortOption};
+use stampfly_host::serve::{Key, OpenPorts, PortOption};
 use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::{Transport, Vehicle};
 use std::process::ExitCode;
@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 
 /// Exit code of a wrong command line.
 const USAGE: u8 = 2;
-/// What a real vehicle can be asked: everything but what a world does.
+/// What a real vehicle can be asked: everything but what a world does. The last two at a cable alone, where a motor can be stopped whatever happens to the radio.
 const OFFERS: &[&str] =
     &["guided", "sticks", "alive", "param_set", "param_get", "param_save", "console", "motor_test", "motor_stop"];
+const BY_RADIO: usize = OFFERS.len() - 2;
 
 pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
     let place = match &options.place {
@@ -26,6 +27,11 @@ pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
             None => return Ok(ExitCode::from(USAGE)),
         },
     };
+    let is_radio = matches!(place, Place::Udp(_));
+    if is_radio != options.key.is_some() {
+        eprintln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
+        return Ok(ExitCode::from(USAGE));
+    }
     vehicles::with(&options.vehicle.name, Connect(options, place))?
 }
 
@@ -36,19 +42,25 @@ impl ForVehicle for Connect<'_> {
 
     fn run<V: Vehicle>(self) -> Self::Output {
         let Self(options, place) = self;
-        PortOption::check(&options.port, PORTS, "a connected vehicle")?;
+        // Nobody speaks MAVLink in sealed frames: in a network the vehicle has ports of its own for that.
+        let (specs, offers) = match place {
+            Place::Udp(_) => (PORTS.get(..1).unwrap_or_default(), OFFERS.get(..BY_RADIO).unwrap_or_default()),
+            _ => (PORTS, OFFERS),
+        };
+        PortOption::check(&options.port, specs, "a connected vehicle")?;
+        let key = options.key.as_deref().map(Key::read).transpose()?.map(|key| key.sealing()).transpose()?;
         std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
         let hub = Hub::new(vec![VehicleCard {
             faults: &[],
             missions: Vec::new(),
-            ..VehicleCard::of::<V>(V::NAME, &V::default_config()).offering(OFFERS)
+            ..VehicleCard::of::<V>(V::NAME, &V::default_config()).offering(offers)
         }]);
         let is_public = |wanted: &&PortOption| wanted.address.is_some_and(|address| !address.ip().is_loopback());
         if let Some(public) = options.port.iter().filter(|wanted| wanted.name != "http").find(is_public) {
             let why = "what a vehicle says on its cable is not signed, so programs on this machine alone may have it";
             return Err(format!("port '{}': {why}; '--port {0}=NUMBER' leaves it here", public.name).into());
         }
-        let ports = Arc::new(OpenPorts::open(PORTS, &options.port, 0, None)?);
+        let ports = Arc::new(OpenPorts::open(specs, &options.port, 0, None)?);
         let mut server = None;
         for (port, address) in ports.places() {
             let does = match port.transport {
@@ -71,6 +83,9 @@ impl ForVehicle for Connect<'_> {
         let until = options.seconds.map(|seconds| Instant::now() + Duration::from_secs_f32(seconds));
         let bridge = Bridge::<V>::new(place, options.baud, hub, ports, options.out.clone());
         let mut bridge = bridge.ok_or("the ground station does not know this vehicle")?;
+        if let Some(key) = key {
+            bridge = bridge.with_key(key);
+        }
         if let Some(file) = &options.record {
             let failed = |error| format!("{}: {error}", file.display());
             bridge = bridge.recording(file.clone()).map_err(failed)?;

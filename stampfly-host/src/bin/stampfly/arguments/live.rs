@@ -51,10 +51,13 @@ pub struct ServeOptions {
 /// Options of `connect`.
 #[derive(Clone, Debug, Args)]
 pub struct ConnectOptions {
-    /// The vehicle's serial port, such as /dev/ttyACM0, or tcp:HOST:PORT. Without this: the only one that looks like a vehicle's. One
-    /// that is not there, or not any more, is waited for.
-    #[arg(value_name = "PATH|tcp:HOST:PORT")]
+    /// The vehicle's serial port, such as /dev/ttyACM0, or tcp:HOST:PORT, or udp:HOST for a vehicle in a Wi-Fi network, which wants its `--key`. Without this: the only
+    /// serial port that looks like a vehicle's. One that is not there, or not any more, is waited for.
+    #[arg(value_name = "PATH|tcp:HOST:PORT|udp:HOST")]
     pub place: Option<Place>,
+    /// A file with the vehicle's key, as its console's `key` shows it, or as 64 hexadecimal digits. For udp:HOST.
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
     #[command(flatten)]
     pub vehicle: VehicleOption,
     /// Where a port is to be, or not at all: `http=8081`, `mavlink-tcp=off`; may be repeated. Number 0 is any that is free. Whoever

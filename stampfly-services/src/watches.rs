@@ -60,24 +60,29 @@ impl<const N: usize> Watches<N> {
 
     /// Hands out what is due: topic, number of the sample, instant and words.
     pub fn poll(&mut self, now: Instant, samples: &dyn Samples, put: &mut dyn FnMut(u16, u16, Instant, &[u32])) {
-        let (mut left, length) = (AT_ONCE, self.all.len());
+        for _ in 0..AT_ONCE {
+            let Some((topic, at, words)) = self.next(now, samples) else { return };
+            put(topic, self.count, at, words);
+        }
+    }
+
+    /// One that is due: topic, instant and words.
+    pub fn next<'s>(&mut self, now: Instant, samples: &'s dyn Samples) -> Option<(u16, Instant, &'s [u32])> {
+        let length = self.all.len();
         for step in 0..length {
             let place = (self.first + step) % length.max(1);
             let Some(watch) = self.all.get_mut(place).filter(|watch| now >= watch.next) else { continue };
             let Some((at, words)) = samples.words(watch.topic.into()).filter(|(at, _)| Some(*at) != watch.told) else {
                 continue;
             };
-            if left == 0 {
-                self.first = place;
-                return;
-            }
-            left -= 1;
             watch.told = Some(at);
             // From the plan, so that late calls do not add up; but never two at once.
             let planned = watch.next + watch.period;
             watch.next = if planned > now { planned } else { now + watch.period };
+            self.first = place + 1;
             self.count = self.count.wrapping_add(1);
-            put(watch.topic, self.count, at, words);
+            return Some((watch.topic, at, words));
         }
+        None
     }
 }

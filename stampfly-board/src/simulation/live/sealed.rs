@@ -1,0 +1,125 @@
+//! The simulated StampFly's secure link in a network: the firmware's [`Link`](crate::link::Link), with this machine's datagrams in place of a radio.
+//!
+//! Whoever has the key flies, asks and watches as on the vehicle's own Wi-Fi. Without a key the port is not there.
+
+use super::seats::{Board, Controls, obey};
+use super::{SEALED, Seen};
+use crate::VehicleConfig;
+use crate::link::Outgoing;
+use crate::simulation::terminal::{Desk, said};
+use crate::topics::TOPICS;
+use core::hash::BuildHasher as _;
+use core::net::{SocketAddr, SocketAddrV4};
+use stampfly_flight::console::Request;
+use stampfly_link::Address;
+use stampfly_link::secure::{Heard, Key, MAX_FRAME, MIN_FRAME, Payload, Sample, Vehicle};
+use stampfly_services::RadioDesk;
+use stampfly_services::cable::fingerprint;
+use stampfly_services::desk::{Answer, Room};
+use stampfly_services::network::Routes;
+use stampfly_services::radio_desk::NETWORK_SAMPLES;
+use stampfly_sim::vehicle::{Client, Put};
+use stampfly_types::Instant;
+use std::hash::RandomState;
+
+/// The number of the key: the firmware's.
+const KEY_ID: u8 = 1;
+/// Answers of the desk in a turn, as the firmware's radio has room for.
+const ANSWERS: usize = 2;
+
+/// The vehicle's end.
+pub(super) struct Sealed {
+    routes: Routes,
+    desk: RadioDesk,
+}
+
+impl Sealed {
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self { routes: Routes::new(), desk: RadioDesk::new(fingerprint(&TOPICS, config)) }
+    }
+
+    /// Takes what has come.
+    pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>) {
+        let (SocketAddr::V4(place), Some(link)) = (from.address, controls.hands.radio.link()) else { return };
+        let source = self.routes.source(now, place, link.guarded.station());
+        let mut room = [0; MAX_FRAME];
+        let Some(frame) = room.get_mut(..bytes.len()).filter(|frame| frame.len() >= MIN_FRAME) else { return };
+        frame.copy_from_slice(bytes);
+        if let Ok(Heard::Authentic(received)) = link.guarded.receive_sealed(now, source, frame)
+            && let Some(received) = link.obey(now, received)
+        {
+            // A station asks again for what there is no room for.
+            self.desk.ask(now, &received.payload);
+        }
+    }
+
+    /// Sends what is due. Call it every 20 ms.
+    pub fn poll(&mut self, now: Instant, controls: &mut Controls<'_>, desk: &Desk<'_>, put: Put<'_>) {
+        let Board { radio, console, config, seen, .. } = &mut controls.hands;
+        let Some(link) = radio.link() else { return };
+        let Self { routes, desk: asked } = self;
+        let mut send = |to: Address, frame: &[u8]| {
+            let mut send = |place: SocketAddrV4| put(&Client { port: SEALED, address: place.into() }, frame);
+            if to == Address::BROADCAST {
+                routes.recent(now).for_each(send);
+            } else if let Some(place) = routes.place(to) {
+                send(place);
+            }
+        };
+        let mut room = [0; MAX_FRAME];
+        for what in Outgoing::ALL {
+            if let Some((to, frame)) = link.transmit(now, what, fresh(), &mut room) {
+                send(to, frame);
+            }
+        }
+        let station = link.guarded.station().and_then(|station| routes.place(station));
+        let station = station.map(|place| Client { port: SEALED, address: place.into() });
+        let mut say = |payload: &Payload<'_>| {
+            if let Some((to, frame)) = link.guarded.seal(now, payload, &mut room) {
+                send(to, frame);
+            }
+        };
+        let mut answer = Room::default();
+        for _ in 0..ANSWERS {
+            let next = desk.console(config, |vehicle| {
+                let Answer { payload, request, .. } = asked.questions.answer(now, vehicle, &mut answer)?;
+                say(&payload);
+                Some(request)
+            });
+            match next {
+                None => break,
+                Some(Request::Nothing) => {}
+                Some(Request::Vehicle(command)) => {
+                    command.publish(now, console);
+                    asked.questions.report(&said(command));
+                }
+                Some(request) => asked.questions.report(&obey(&request, seen, config)),
+            }
+        }
+        let mut words = [[0; 4]; Sample::MAX_WORDS];
+        for _ in 0..NETWORK_SAMPLES {
+            let Some(payload) = asked.next(now, desk.newest, &mut words) else { break };
+            say(&payload);
+        }
+        let Seen { tape, chunks, .. } = seen;
+        if let Some((wanted, station)) = asked.questions.record().zip(station) {
+            tape.borrow_mut().ask(now, station, wanted);
+        }
+        if station.is_some() && tape.borrow().line() == station {
+            chunks.borrow_mut().drain(..).for_each(|chunk| say(&Payload::Chunk(&chunk)));
+        }
+    }
+
+    /// From now on stations with this key are heard.
+    pub fn open(key: [u8; 32], controls: &mut Controls<'_>) {
+        if let (Ok(key), Some(link)) = (Key::generate(KEY_ID, key), controls.hands.radio.link()) {
+            link.guarded.set_vehicle(Vehicle::new(key));
+        }
+    }
+}
+
+/// Eight bytes that were not there before, in no run of the program: an old station's frames are good for none of its sessions. They are the
+/// operating system's; nothing of them comes to the bus.
+fn fresh() -> [u8; 8] {
+    RandomState::new().hash_one(0_u8).to_le_bytes()
+}

@@ -1,0 +1,125 @@
+//! A vehicle's line over the secure link: sealed frames, a datagram each, as the firmware speaks them in a Wi-Fi network.
+//!
+//! The station's end of the session, and its socket. What is said on the line is a cable's, and [translated](super::translation).
+
+use super::translation::Translation;
+use stampfly_link::secure::{Key, MAX_FRAME, Payload, Station};
+use std::hash::{BuildHasher as _, RandomState};
+use std::io;
+use std::net::{ToSocketAddrs as _, UdpSocket};
+use std::time::{Duration, Instant};
+
+/// Between two signs of life. A vehicle looks for another station after half a second of silence.
+const SIGN: Duration = Duration::from_millis(200);
+/// Between two turns of the handshake.
+const TURN: Duration = Duration::from_millis(20);
+/// Datagrams taken in one look.
+const AT_ONCE: usize = 64;
+/// A topic that no vehicle has: to end watching it is a sign of life that does nothing.
+const NO_TOPIC: u16 = u16::MAX;
+
+/// The line.
+pub struct Sealed {
+    socket: UdpSocket,
+    station: Station,
+    translation: Translation,
+    begun: Instant,
+    signed: Option<Instant>,
+    turned: Option<Instant>,
+}
+
+impl Sealed {
+    /// To the vehicle at this address that has this key. A look waits so long for something to come.
+    pub fn open(address: &str, key: &Key, look: Duration) -> io::Result<Self> {
+        let place = address.to_socket_addrs()?.next().ok_or(io::ErrorKind::NotFound)?;
+        let socket = UdpSocket::bind(if place.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
+        socket.connect(place)?;
+        socket.set_read_timeout(Some(look))?;
+        let (station, translation) = (Station::new(key.clone()), Translation::new());
+        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None })
+    }
+
+    /// What has come, after a short wait if nothing has: so many bytes, as a cable has them.
+    pub fn read(&mut self, room: &mut [u8]) -> io::Result<usize> {
+        if self.translation.frames.is_empty() {
+            self.keep_alive();
+            self.receive()?;
+        }
+        let frames = &mut self.translation.frames;
+        let count = room.len().min(frames.len());
+        room.iter_mut().zip(frames.drain(..count)).for_each(|(to, byte)| *to = byte);
+        Ok(count)
+    }
+
+    /// Seals what a cable's bytes say, and sends it.
+    pub fn write(&mut self, bytes: &[u8]) {
+        let now = self.now();
+        let Self { socket, station, translation, .. } = self;
+        translation.say(bytes, &mut |payload| seal(socket, station, now, payload));
+    }
+
+    fn now(&self) -> stampfly_types::Instant {
+        stampfly_types::Instant::from_micros(self.begun.elapsed().as_micros() as u64)
+    }
+
+    /// The handshake's turn, and a sign of life.
+    fn keep_alive(&mut self) {
+        let now = self.now();
+        let Self { socket, station, .. } = self;
+        if is_due(&mut self.turned, TURN) {
+            let mut room = [0; MAX_FRAME];
+            if let Some(frame) = station.transmit(now, fresh(), &mut room) {
+                send(socket, frame);
+            }
+        }
+        if is_due(&mut self.signed, SIGN) {
+            seal(socket, station, now, &Payload::Watch { topic: NO_TOPIC, period: 0 });
+            // Whoever has spoken is offered a session, as long as the vehicle has none.
+            send(socket, &[]);
+        }
+    }
+
+    fn receive(&mut self) -> io::Result<()> {
+        // Room for one byte more than a frame has: a datagram that fills it is none.
+        let mut room = [0; MAX_FRAME + 1];
+        for _ in 0..AT_ONCE {
+            // A vehicle that is not there yet is an error as well, and is waited for as one that is silent.
+            let Ok(length) = self.socket.recv(&mut room) else { break };
+            // The first was waited for; what else has come is there.
+            self.socket.set_nonblocking(true)?;
+            let now = self.now();
+            // What is refused is no word of the vehicle's.
+            if let Some(frame) = room.get_mut(..length)
+                && let Ok(Some(received)) = self.station.receive(now, frame)
+            {
+                self.translation.hear(&received.payload);
+            }
+        }
+        self.socket.set_nonblocking(false)
+    }
+}
+
+/// Returns the counter of the frame. `None` without a session, or when a value must not be sent.
+fn seal(socket: &UdpSocket, station: &mut Station, now: stampfly_types::Instant, payload: &Payload<'_>) -> Option<u32> {
+    let mut room = [0; MAX_FRAME];
+    send(socket, station.seal(now, payload, &mut room).ok()?);
+    Some(station.counter())
+}
+
+/// What cannot be sent is lost, as on any network.
+fn send(socket: &UdpSocket, bytes: &[u8]) {
+    _ = socket.send(bytes);
+}
+
+fn is_due(last: &mut Option<Instant>, period: Duration) -> bool {
+    let is_due = last.is_none_or(|last| last.elapsed() >= period);
+    if is_due {
+        *last = Some(Instant::now());
+    }
+    is_due
+}
+
+/// Eight new bytes: the operating system's random numbers, by way of what hash maps use.
+fn fresh() -> [u8; 8] {
+    RandomState::new().hash_one(0_u8).to_le_bytes()
+}
