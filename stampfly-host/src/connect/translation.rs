@@ -122,3 +122,127 @@ fn take<T: PartialEq>(asked: &mut VecDeque<(T, u16)>, of: &T) -> u16 {
     let place = asked.iter().position(|(other, _)| other == of);
     place.and_then(|place| asked.remove(place)).map_or(0, |(_, number)| number)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_link::secure::Sample;
+    use stampfly_types::Instant;
+    use stampfly_types::messages::{GuidedCommand, GuidedKind};
+
+    const OURS: u16 = 7;
+
+    /// The station's end of the line, a radio that seals everything, and what is between them.
+    struct Line {
+        translation: Translation,
+        /// What was sent, and the counter of the next frame.
+        sent: Vec<String>,
+        counter: u32,
+    }
+
+    impl Line {
+        fn new() -> Self {
+            Self { translation: Translation::new(), sent: Vec::new(), counter: 100 }
+        }
+
+        /// The station says this.
+        fn say(&mut self, number: u16, payload: &Payload<'_>) {
+            let (mut writer, mut bytes) = (MavlinkWriter::new(245, 190), Vec::new());
+            Envelope::write(OURS, number, payload, &mut |part| {
+                let mut room = [0; LONGEST];
+                let tunnel = Tunnel::new(TYPE, [0; 2], part).expect("it fits");
+                let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);
+                bytes.extend_from_slice(frame.expect("it fits"));
+            });
+            let Self { translation, sent, counter } = self;
+            translation.say(&bytes, &mut |payload| {
+                sent.push(format!("{payload:?}"));
+                *counter += 1;
+                Some(*counter)
+            });
+        }
+
+        /// The vehicle says this: fingerprint, number and payload that the station reads.
+        fn hear(&mut self, payload: &Payload<'_>) -> Option<(u16, u16, String)> {
+            self.translation.hear(payload);
+            let (mut decoder, mut assembly) = (MavlinkDecoder::<MavMessage>::new(), Assembly::default());
+            let bytes: Vec<u8> = self.translation.frames.drain(..).collect();
+            let mut read = None;
+            for byte in bytes {
+                let tunnel = decoder.feed(byte).and_then(|frame| Tunnel::read(frame.payload));
+                if let Some((envelope, payload)) = tunnel.as_ref().and_then(|tunnel| assembly.feed(&tunnel.bytes)) {
+                    read = Some((envelope.table, envelope.number, format!("{payload:?}")));
+                }
+            }
+            read
+        }
+    }
+
+    fn read(payload: &Payload<'_>, number: u16) -> Option<(u16, u16, String)> {
+        Some((OURS, number, format!("{payload:?}")))
+    }
+
+    #[test]
+    fn every_answer_has_the_number_of_its_question() {
+        let mut line = Line::new();
+        line.say(1, &Payload::Watch { topic: 3, period: 40 });
+        line.hear(&Payload::Tables { fingerprint: OURS });
+        let arm = GuidedCommand { kind: GuidedKind::Arm, ..GuidedCommand::default() };
+        line.say(2, &Payload::Guided(arm));
+        line.say(3, &Payload::Kill);
+        line.say(4, &Payload::ReadParameter { index: 9 });
+        line.say(5, &Payload::WriteParameter { index: 8, value: 1.0 });
+        line.say(6, &Payload::ReadParameter { index: 9 });
+        line.say(7, &Payload::Line("status"));
+        let taken = |counter| Payload::Acknowledgement { counter, taken: true };
+        let value = |index| Payload::Parameter { index, value: 1.0, taken: true };
+        let reply = |last| Payload::Reply { text: "well", last };
+        // In another order, as on a radio: frames 101 to 107, a watch first.
+        for (answer, number) in [
+            (taken(103), 3),
+            (taken(102), 2),
+            (taken(102), 0),
+            (value(8), 5),
+            (value(9), 4),
+            (value(9), 6),
+            (value(9), 0),
+            (reply(false), 7),
+            (reply(true), 7),
+        ] {
+            assert_eq!(line.hear(&answer), read(&answer, number));
+        }
+    }
+
+    #[test]
+    fn nothing_that_depends_on_tables_passes_before_they_are_known_and_with_others_only_a_kill() {
+        let words = [[0; 4]; 52];
+        let sample = Payload::Sample(Sample::new(3, Instant::ZERO, &words));
+        let mut line = Line::new();
+        line.say(1, &Payload::WriteParameter { index: 8, value: 1.0 });
+        assert_eq!((line.sent.len(), line.hear(&sample)), (0, None));
+
+        line.say(2, &Payload::Watch { topic: 3, period: 40 });
+        let told = Payload::Tables { fingerprint: OURS + 1 };
+        assert_eq!(line.hear(&told), Some((OURS + 1, 0, format!("{told:?}"))));
+        assert_eq!(line.hear(&sample), None);
+        line.say(3, &Payload::WriteParameter { index: 8, value: 1.0 });
+        line.say(4, &Payload::Line("param reset"));
+        line.say(5, &Payload::Kill);
+        assert_eq!(line.sent[1..], ["Kill"]);
+
+        // Another vehicle, or another firmware.
+        line.hear(&Payload::Tables { fingerprint: OURS });
+        assert_eq!(line.hear(&sample), read(&sample, 0));
+    }
+
+    #[test]
+    fn what_is_never_answered_is_forgotten() {
+        let mut line = Line::new();
+        line.say(1, &Payload::Watch { topic: 3, period: 40 });
+        line.hear(&Payload::Tables { fingerprint: OURS });
+        (0..1_000).for_each(|number| line.say(number, &Payload::ReadParameter { index: number }));
+        assert_eq!(line.translation.parameters.len(), ASKED);
+        let newest = Payload::Parameter { index: 999, value: 0.0, taken: true };
+        assert_eq!(line.hear(&newest), read(&newest, 999));
+    }
+}
