@@ -13,6 +13,8 @@ use std::time::{Duration, Instant};
 const SIGN: Duration = Duration::from_millis(200);
 /// Between two turns of the handshake.
 const TURN: Duration = Duration::from_millis(20);
+/// A kill is said again in every turn for this long: of sixteen frames one arrives, where every second one is lost.
+const KILLING: Duration = Duration::from_millis(300);
 /// Datagrams taken in one look.
 const AT_ONCE: usize = 64;
 /// A topic that no vehicle has: to end watching it is a sign of life that does nothing.
@@ -26,6 +28,8 @@ pub struct Sealed {
     begun: Instant,
     signed: Option<Instant>,
     turned: Option<Instant>,
+    /// When somebody has asked for a kill.
+    killed: Option<Instant>,
 }
 
 impl Sealed {
@@ -36,7 +40,7 @@ impl Sealed {
         socket.connect(place)?;
         socket.set_read_timeout(Some(look))?;
         let (station, translation) = (Station::new(key.clone()), Translation::new());
-        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None })
+        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None, killed: None })
     }
 
     /// What has come, after a short wait if nothing has: so many bytes, as a cable has them.
@@ -54,8 +58,13 @@ impl Sealed {
     /// Seals what a cable's bytes say, and sends it.
     pub fn write(&mut self, bytes: &[u8]) {
         let now = self.now();
-        let Self { socket, station, translation, .. } = self;
-        translation.say(bytes, &mut |payload| seal(socket, station, now, payload));
+        let Self { socket, station, translation, killed, .. } = self;
+        translation.say(bytes, &mut |payload| {
+            if payload.is_kill() {
+                *killed = Some(Instant::now());
+            }
+            seal(socket, station, now, payload)
+        });
     }
 
     fn now(&self) -> stampfly_types::Instant {
@@ -65,11 +74,16 @@ impl Sealed {
     /// The handshake's turn, and a sign of life.
     fn keep_alive(&mut self) {
         let now = self.now();
-        let Self { socket, station, .. } = self;
+        let Self { socket, station, translation, .. } = self;
         if is_due(&mut self.turned, TURN) {
             let mut room = [0; MAX_FRAME];
             if let Some(frame) = station.transmit(now, fresh(), &mut room) {
                 send(socket, frame);
+            }
+            self.killed = self.killed.filter(|killed| killed.elapsed() < KILLING);
+            if self.killed.is_some() {
+                let counter = seal(socket, station, now, &Payload::Kill);
+                counter.into_iter().for_each(|counter| translation.kill_again(counter));
             }
         }
         if is_due(&mut self.signed, SIGN) {

@@ -36,10 +36,11 @@ pub(super) struct Translation {
     /// Fingerprint of the station's tables.
     ours: u16,
     tables: Tables,
-    /// Numbers of commands by the counters of their frames, of questions by the places of their parameters, and of the line.
+    /// Numbers of commands by the counters of their frames, of questions by the places of their parameters, of the line and of the newest kill.
     commands: VecDeque<(u32, u16)>,
     parameters: VecDeque<(u16, u16)>,
     line: u16,
+    kill: u16,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
 }
@@ -55,6 +56,7 @@ impl Translation {
             commands: VecDeque::new(),
             parameters: VecDeque::new(),
             line: 0,
+            kill: 0,
             frames: VecDeque::new(),
         }
     }
@@ -75,6 +77,9 @@ impl Translation {
                 Tables::Others(_) => payload.is_kill(),
             };
             let Some(counter) = passes.then(|| send(&payload)).flatten() else { continue };
+            if payload.is_kill() {
+                self.kill = number;
+            }
             match payload {
                 Payload::Guided(_) | Payload::Kill => remember(&mut self.commands, (counter, number)),
                 Payload::ReadParameter { index } | Payload::WriteParameter { index, .. } => {
@@ -84,6 +89,11 @@ impl Translation {
                 _ => {}
             }
         }
+    }
+
+    /// The newest kill was said again, in the frame with this counter: to acknowledge either is an answer.
+    pub fn kill_again(&mut self, counter: u32) {
+        remember(&mut self.commands, (counter, self.kill));
     }
 
     /// Takes what the vehicle says.
@@ -233,6 +243,17 @@ mod tests {
         // Another vehicle, or another firmware.
         line.hear(&Payload::Tables { fingerprint: OURS });
         assert_eq!(line.hear(&sample), read(&sample, 0));
+    }
+
+    #[test]
+    fn a_kill_that_is_said_again_is_answered_by_either_frame() {
+        let mut line = Line::new();
+        line.say(1, &Payload::Watch { topic: 3, period: 40 });
+        line.hear(&Payload::Tables { fingerprint: OURS });
+        line.say(2, &Payload::Kill);
+        line.translation.kill_again(150);
+        let taken = Payload::Acknowledgement { counter: 150, taken: true };
+        assert_eq!(line.hear(&taken), read(&taken, 2));
     }
 
     #[test]
