@@ -8,7 +8,7 @@ use crate::topics::{Id, LinkEnds};
 use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
 use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, PilotInput};
-use stampfly_types::{Duration, Instant, Message, Stamped};
+use stampfly_types::{Duration, Instant, Message};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
 pub const PERIOD: Duration = Duration::from_millis(20);
@@ -21,7 +21,7 @@ const SENSOR_ERROR: Alerts =
 pub struct Link<'b> {
     /// Whom it listens to, and what it has refused.
     pub guarded: Guarded,
-    ends: LinkEnds<'b>,
+    pub(crate) ends: LinkEnds<'b>,
     /// The newest command's frame, and whether it was taken: to be acknowledged.
     commanded: Option<(u32, bool)>,
     counter: u8,
@@ -102,11 +102,6 @@ impl<'b> Link<'b> {
         self.ends.command_pilot.publish(at, input);
     }
 
-    /// The newest telemetry.
-    pub fn telemetry(&mut self) -> Option<Stamped<TelemetryFrame>> {
-        self.ends.telemetry.latest()
-    }
-
     /// Follows the mode machine, and returns what is to be sent now, and where. `random` are eight new bytes of a generator.
     pub fn transmit<'r>(
         &mut self,
@@ -128,7 +123,7 @@ impl<'b> Link<'b> {
             }
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
-                let (at, frame) = self.telemetry().map(|new| (new.at, new.data)).unwrap_or_default();
+                let (at, frame) = self.ends.telemetry.latest().map(|new| (new.at, new.data)).unwrap_or_default();
                 let packet = packet(self.counter, &frame);
                 if let Some(peer) = self.guarded.open_peer(now) {
                     return Some((peer, put(room, &packet.to_bytes())?));

@@ -109,7 +109,7 @@ impl<'b> Radio<'b> {
         let now = self.clock.now();
         match &mut self.way {
             Way::Direct(link) => {
-                let newest = link.telemetry();
+                let newest = link.ends.telemetry.latest();
                 if let Some(frame) = newest.and_then(|frame| self.telemetry.pass(now, &frame.data)) {
                     self.frame = frame;
                 }

@@ -104,7 +104,14 @@ impl Translation {
         let (table, number) = match (self.tables, payload) {
             // The station sees the fingerprint, and nothing else.
             (Tables::Others(table), Payload::Tables { .. }) => (table, 0),
-            (Tables::Ours, Payload::Acknowledgement { counter, .. }) => (self.ours, take(&mut self.commands, counter)),
+            (Tables::Ours, Payload::Acknowledgement { counter, taken }) => {
+                let number = take(&mut self.commands, counter);
+                // Of a kill that is said again and again, the vehicle has no room for the last ones because it has the first.
+                if !taken && number == self.kill {
+                    return;
+                }
+                (self.ours, number)
+            }
             (Tables::Ours, Payload::Parameter { index, .. }) => (self.ours, take(&mut self.parameters, index)),
             (Tables::Ours, Payload::Reply { .. }) => (self.ours, self.line),
             (Tables::Ours, _) => (self.ours, 0),
@@ -251,7 +258,10 @@ mod tests {
         line.say(1, &Payload::Watch { topic: 3, period: 40 });
         line.hear(&Payload::Tables { fingerprint: OURS });
         line.say(2, &Payload::Kill);
+        line.translation.kill_again(149);
         line.translation.kill_again(150);
+        let full = Payload::Acknowledgement { counter: 149, taken: false };
+        assert_eq!(line.hear(&full), None);
         let taken = Payload::Acknowledgement { counter: 150, taken: true };
         assert_eq!(line.hear(&taken), read(&taken, 2));
     }

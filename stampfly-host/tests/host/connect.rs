@@ -15,7 +15,7 @@ fn vehicle(folder: &Path, number: u16) -> (Program, String) {
     Program::serve(folder, &format!("usb-tcp={number}"), &[])
 }
 
-fn connect(folder: &Path, place: &str, more: &[&str]) -> (Program, WebSocket<TcpStream>) {
+pub fn connect(folder: &Path, place: &str, more: &[&str]) -> (Program, WebSocket<TcpStream>) {
     let ports = ["--port", "http=0", "--port", "others=off"];
     let arguments = [&["connect", place][..], &ports, more].concat();
     let mut program = Program::start(folder, &arguments);
@@ -26,7 +26,7 @@ fn connect(folder: &Path, place: &str, more: &[&str]) -> (Program, WebSocket<Tcp
 }
 
 /// The next text of this kind that is as wanted.
-fn next(socket: &mut WebSocket<TcpStream>, kind: &str, is_wanted: impl Fn(&Value) -> bool) -> Value {
+pub fn next(socket: &mut WebSocket<TcpStream>, kind: &str, is_wanted: impl Fn(&Value) -> bool) -> Value {
     let until = Instant::now() + SOON;
     while Instant::now() < until {
         let Message::Text(text) = socket.read().expect("a message") else { continue };
@@ -38,7 +38,7 @@ fn next(socket: &mut WebSocket<TcpStream>, kind: &str, is_wanted: impl Fn(&Value
     panic!("no {kind}");
 }
 
-fn ask(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) -> Value {
+pub fn ask(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) -> Value {
     what["vehicle"] = 0.into();
     what["id"] = id.into();
     socket.send(Message::text(what.to_string())).expect("sent");
@@ -46,17 +46,17 @@ fn ask(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) -> Value {
 }
 
 /// What the next state says of the one topic that is subscribed to: its place, samples so far, instant, numbers.
-fn sample(socket: &mut WebSocket<TcpStream>) -> Value {
+pub fn sample(socket: &mut WebSocket<TcpStream>) -> Value {
     let state = next(socket, "state", |state| state[0].as_array().is_some_and(|state| state.len() > 2));
     state[0][2].clone()
 }
 
 /// Its samples so far.
-fn count(socket: &mut WebSocket<TcpStream>) -> u64 {
+pub fn count(socket: &mut WebSocket<TcpStream>) -> u64 {
     sample(socket)[1].as_u64().expect("a number of samples")
 }
 
-fn is_up(up: bool) -> impl Fn(&Value) -> bool {
+pub fn is_up(up: bool) -> impl Fn(&Value) -> bool {
     move |event| event["kind"] == "link" && event["up"] == up
 }
 
@@ -116,7 +116,7 @@ fn a_page_sees_asks_and_changes_a_vehicle_over_its_line_and_is_told_when_it_is_g
 }
 
 /// Waits until the console's answer is as wanted.
-fn is_done(socket: &mut WebSocket<TcpStream>, id: u32, line: &str, wanted: &str) {
+pub fn is_done(socket: &mut WebSocket<TcpStream>, id: u32, line: &str, wanted: &str) {
     let until = Instant::now() + SOON;
     loop {
         let answer = ask(socket, id, json!({ "do": "console", "line": line }));
@@ -128,12 +128,12 @@ fn is_done(socket: &mut WebSocket<TcpStream>, id: u32, line: &str, wanted: &str)
     }
 }
 
-fn alive(socket: &mut WebSocket<TcpStream>) {
+pub fn alive(socket: &mut WebSocket<TcpStream>) {
     socket.send(Message::text(json!({ "vehicle": 0, "id": 0, "do": "alive" }).to_string())).expect("sent");
 }
 
 /// Time passes, and the page is there.
-fn passes(socket: &mut WebSocket<TcpStream>, seconds: u32) {
+pub fn passes(socket: &mut WebSocket<TcpStream>, seconds: u32) {
     for _ in 0..5 * seconds {
         alive(socket);
         std::thread::sleep(Duration::from_millis(200));
@@ -144,8 +144,13 @@ fn passes(socket: &mut WebSocket<TcpStream>, seconds: u32) {
 fn a_flight_is_recorded_over_the_line_and_replays_bit_for_bit_around_parameters_that_change_between_hops() {
     let folder = folder("connect", "record");
     let (_serving, place) = vehicle(&folder, 0);
-    let arguments = ["--record", "flight.sfr", "--for", "30"];
-    let (mut connected, mut socket) = connect(&folder, &format!("tcp:{place}"), &arguments);
+    recorded(&folder, &format!("tcp:{place}"), &[]);
+}
+
+/// Flies a hop that is recorded over the line to that place, and replays it.
+pub fn recorded(folder: &Path, place: &str, more: &[&str]) {
+    let arguments = [&["--record", "flight.sfr", "--for", "30"], more].concat();
+    let (mut connected, mut socket) = connect(folder, place, &arguments);
     next(&mut socket, "event", is_up(true));
     // Calibrated, and nobody has asked for anything yet.
     is_done(&mut socket, 1, "status", "blocks   NO_LINK\n");
@@ -167,7 +172,7 @@ fn a_flight_is_recorded_over_the_line_and_replays_bit_for_bit_around_parameters_
     let said = connected.said("flight.sfr: ", "flight.sfr: ");
     assert!(said.parse().is_ok_and(|chunks: u32| chunks > 1_000), "{said} chunks");
     let replay = Command::new(env!("CARGO_BIN_EXE_stampfly"))
-        .current_dir(&folder)
+        .current_dir(folder)
         .args(["replay", "flight.sfr", "--json"])
         .output();
     let replay = replay.expect("the program starts");
@@ -196,95 +201,4 @@ fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_
     assert_eq!(code(&["tcp:nowhere"]), Some(2));
     assert_eq!(code(&["/dev/null", "--baud", "12"]), Some(2));
     assert_eq!(code(&["/dev/null", "--port", "tello=1"]), Some(1), "as of serve");
-}
-
-/// A file with a key, whose first byte is this.
-fn key(folder: &Path, name: &str, first: u8) -> String {
-    let file = folder.join(name);
-    std::fs::write(&file, format!("{first:02x}{}\n", "5a".repeat(31))).expect("the folder can be written");
-    file.display().to_string()
-}
-
-#[test]
-fn a_page_sees_asks_and_flies_a_vehicle_over_the_radio_with_its_key_and_not_with_another() {
-    let folder = folder("connect", "sealed");
-    let (ours, others) = (key(&folder, "ours", 1), key(&folder, "others", 2));
-    let (serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
-    let (mut connected, mut socket) = connect(&folder, &format!("udp:{place}"), &["--key", &ours]);
-    let hello = next(&mut socket, "hello", |_| true);
-    let offers = hello["vehicles"][0]["offers"].to_string();
-    assert!(offers.contains("param_set") && !offers.contains("motor_test"), "{offers}");
-    next(&mut socket, "event", is_up(true));
-
-    let topics = json!({ "id": 1, "do": "subscribe", "topics": ["estimate_state"], "rate": 50 });
-    socket.send(Message::text(topics.to_string())).expect("sent");
-    let (begun, first) = (Instant::now(), count(&mut socket));
-    while begun.elapsed() < Duration::from_secs(3) {
-        count(&mut socket);
-    }
-    let rate = (count(&mut socket) - first) as f64 / begun.elapsed().as_secs_f64();
-    assert!(rate > 8.0, "{rate} Hz");
-
-    let set = ask(&mut socket, 2, json!({ "do": "param_set", "name": "eskf.gate", "value": 3.5 }));
-    assert_eq!((&set["ok"], &set["value"]), (&json!(true), &json!(3.5)));
-    assert_eq!(ask(&mut socket, 3, json!({ "do": "param_get", "name": "eskf.gate" }))["value"], json!(3.5));
-    let wrong = json!({ "do": "param_set", "name": "eskf.gate", "value": 1e9 });
-    assert_eq!(ask(&mut socket, 4, wrong)["ok"], json!(false));
-    let list = ask(&mut socket, 5, json!({ "do": "console", "line": "param list" }));
-    let is_whole = |text: &str| text.lines().count() > 100 && text.contains("eskf.gate");
-    assert!(list["text"].as_str().is_some_and(is_whole), "{list}");
-    let motor = json!({ "do": "motor_test", "motor": 1, "duty": 0.1 });
-    assert_eq!(ask(&mut socket, 6, motor)["ok"], json!(false));
-
-    // It flies.
-    is_done(&mut socket, 7, "status", "blocks   NO_LINK\n");
-    passes(&mut socket, 2);
-    for (what, seconds) in [
-        (json!({ "do": "guided", "kind": "arm" }), 1),
-        (json!({ "do": "guided", "kind": "take_off", "height": 0.3 }), 3),
-    ] {
-        assert_eq!(ask(&mut socket, 8, what)["ok"], json!(true));
-        passes(&mut socket, seconds);
-    }
-    let topics = hello["vehicles"][0]["topics"].as_array().expect("topics");
-    let estimate = topics.iter().find(|topic| topic["name"] == "estimate_state").expect("the estimate");
-    let fields = estimate["fields"].as_array().expect("fields");
-    let before = fields.iter().take_while(|field| field["name"] != "position");
-    let down = before.map(|field| field["count"].as_u64().expect("a number") as usize).sum::<usize>() + 2;
-    let until = Instant::now() + SOON;
-    while !sample(&mut socket)[3 + down].as_f64().is_some_and(|down| (-0.4..-0.2).contains(&down)) {
-        alive(&mut socket);
-        assert!(Instant::now() < until, "it does not fly");
-    }
-    // What is no flying is refused meanwhile, and the page is told when it may be asked.
-    let status = ask(&mut socket, 9, json!({ "do": "console", "line": "status" }));
-    assert!(status["text"].as_str().is_some_and(|text| text.contains("disarmed")), "{status}");
-
-    assert_eq!(ask(&mut socket, 10, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(true));
-    is_done(&mut socket, 11, "status", "disarmed");
-
-    // Whoever has another key is not heard, and hears nothing.
-    let (mut stranger, mut page) = connect(&folder, &format!("udp:{place}"), &["--key", &others, "--for", "10"]);
-    next(&mut page, "event", is_up(false));
-    assert_eq!(ask(&mut page, 1, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(false));
-    assert_eq!(stranger.0.wait().expect("it ends").code(), Some(1));
-
-    drop(serving);
-    next(&mut socket, "event", is_up(false));
-    assert_eq!(ask(&mut socket, 12, json!({ "do": "guided", "kind": "arm" }))["ok"], json!(false));
-    assert!(connected.0.try_wait().expect("a process").is_none(), "it waits for the vehicle");
-    let port = format!("sealed={}", place.parse::<SocketAddr>().expect("an address").port());
-    let (_serving, _) = Program::serve(&folder, &port, &["--key", &ours]);
-    next(&mut socket, "event", is_up(true));
-    assert_eq!(ask(&mut socket, 13, json!({ "do": "param_get", "name": "eskf.gate" }))["value"], json!(4.0));
-}
-
-#[test]
-fn a_key_is_for_the_radio_and_the_radio_wants_one() {
-    let folder = folder("connect", "keys");
-    let ours = key(&folder, "ours", 1);
-    for arguments in [&["connect", "udp:127.0.0.1"][..], &["connect", "tcp:127.0.0.1:5763", "--key", &ours]] {
-        let mut program = Program::start(&folder, arguments);
-        assert_eq!(program.0.wait().expect("it ends").code(), Some(2), "{arguments:?}");
-    }
 }

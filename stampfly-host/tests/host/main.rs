@@ -7,6 +7,7 @@ mod cameras;
 mod chips;
 mod command_line;
 mod connect;
+mod connect_radio;
 mod controllers;
 mod determinism;
 mod doctor;

@@ -1,0 +1,229 @@
+//! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
+
+use crate::connect::{alive, ask, connect, count, is_done, is_up, next, passes, recorded, sample};
+use crate::program::{Program, folder};
+use serde_json::{Value, json};
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpStream, UdpSocket};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tungstenite::{Message, WebSocket};
+
+const SOON: Duration = Duration::from_secs(20);
+
+/// A file with a key, whose first byte is this.
+fn key(folder: &Path, name: &str, first: u8) -> String {
+    let file = folder.join(name);
+    std::fs::write(&file, format!("{first:02x}{}\n", "5a".repeat(31))).expect("the folder can be written");
+    file.display().to_string()
+}
+
+/// Subscribes to the estimate, and returns where its height is in a sample: that of the position down.
+fn see(socket: &mut WebSocket<TcpStream>, hello: &Value) -> usize {
+    let topics = json!({ "id": 1, "do": "subscribe", "topics": ["estimate_state"], "rate": 50 });
+    socket.send(Message::text(topics.to_string())).expect("sent");
+    let topics = hello["vehicles"][0]["topics"].as_array().expect("topics");
+    let estimate = topics.iter().find(|topic| topic["name"] == "estimate_state").expect("the estimate");
+    let fields = estimate["fields"].as_array().expect("fields");
+    let before = fields.iter().take_while(|field| field["name"] != "position");
+    // Behind place, number and instant.
+    3 + before.map(|field| field["count"].as_u64().expect("a number") as usize).sum::<usize>() + 2
+}
+
+/// Asks until it is done: nobody else says a command again.
+fn insist(socket: &mut WebSocket<TcpStream>, what: &Value) {
+    let until = Instant::now() + SOON;
+    while ask(socket, 8, what.clone())["ok"] != json!(true) {
+        assert!(Instant::now() < until, "{what}");
+        passes(socket, 1);
+    }
+}
+
+/// Waits until its height above the ground, in m, is there. `false` when that takes longer.
+fn is_at(socket: &mut WebSocket<TcpStream>, down: usize, height: Range<f64>, within: Duration) -> bool {
+    let until = Instant::now() + within;
+    while Instant::now() < until {
+        alive(socket);
+        if sample(socket)[down].as_f64().is_some_and(|down| height.contains(&-down)) {
+            return true;
+        }
+    }
+    false
+}
+
+/// Takes off, and returns when it is in the air. Whoever waits for a lost answer is silent meanwhile, so it says both again and again, as people do.
+fn fly(socket: &mut WebSocket<TcpStream>, down: usize) {
+    passes(socket, 2);
+    let until = Instant::now() + SOON;
+    while Instant::now() < until {
+        for what in [json!({ "kind": "arm" }), json!({ "kind": "take_off", "height": 0.3 })] {
+            let mut what = what;
+            (what["do"], what["vehicle"], what["id"]) = ("guided".into(), 0.into(), 8.into());
+            socket.send(Message::text(what.to_string())).expect("sent");
+            passes(socket, 1);
+        }
+        if is_at(socket, down, 0.2..0.4, Duration::from_secs(3)) {
+            return;
+        }
+    }
+    panic!("it does not fly");
+}
+
+#[test]
+fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
+    let folder = folder("connect", "sealed");
+    let (ours, others) = (key(&folder, "ours", 1), key(&folder, "others", 2));
+    let (serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
+    let (mut connected, mut socket) = connect(&folder, &format!("udp:{place}"), &["--key", &ours]);
+    let hello = next(&mut socket, "hello", |_| true);
+    let offers = hello["vehicles"][0]["offers"].to_string();
+    assert!(offers.contains("param_set") && !offers.contains("motor_test"), "{offers}");
+    next(&mut socket, "event", is_up(true));
+
+    let down = see(&mut socket, &hello);
+    let (begun, first) = (Instant::now(), count(&mut socket));
+    while begun.elapsed() < Duration::from_secs(3) {
+        count(&mut socket);
+    }
+    let rate = (count(&mut socket) - first) as f64 / begun.elapsed().as_secs_f64();
+    assert!(rate > 8.0, "{rate} Hz");
+
+    let set = ask(&mut socket, 2, json!({ "do": "param_set", "name": "eskf.gate", "value": 3.5 }));
+    assert_eq!((&set["ok"], &set["value"]), (&json!(true), &json!(3.5)));
+    assert_eq!(ask(&mut socket, 3, json!({ "do": "param_get", "name": "eskf.gate" }))["value"], json!(3.5));
+    let wrong = json!({ "do": "param_set", "name": "eskf.gate", "value": 1e9 });
+    assert_eq!(ask(&mut socket, 4, wrong)["ok"], json!(false));
+    let list = ask(&mut socket, 5, json!({ "do": "console", "line": "param list" }));
+    let is_whole = |text: &str| text.lines().count() > 100 && text.contains("eskf.gate");
+    assert!(list["text"].as_str().is_some_and(is_whole), "{list}");
+    let motor = json!({ "do": "motor_test", "motor": 1, "duty": 0.1 });
+    assert_eq!(ask(&mut socket, 6, motor)["ok"], json!(false));
+
+    is_done(&mut socket, 7, "status", "blocks   NO_LINK\n");
+    passes(&mut socket, 2);
+    insist(&mut socket, &json!({ "do": "guided", "kind": "arm" }));
+    // What is no flying is refused while it is armed, and the page is told when it may be asked.
+    let status = ask(&mut socket, 9, json!({ "do": "console", "line": "status" }));
+    assert!(status["text"].as_str().is_some_and(|text| text.contains("only while it is disarmed")), "{status}");
+
+    fly(&mut socket, down);
+    let killed = ask(&mut socket, 10, json!({ "do": "guided", "kind": "kill" }));
+    assert_eq!(killed["ok"], json!(true), "{killed}");
+    // It falls.
+    is_done(&mut socket, 11, "status", "CRASHED");
+
+    // Whoever has another key is not heard, and hears nothing.
+    let (mut stranger, mut page) = connect(&folder, &format!("udp:{place}"), &["--key", &others, "--for", "10"]);
+    next(&mut page, "event", is_up(false));
+    assert_eq!(ask(&mut page, 1, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(false));
+    assert_eq!(stranger.0.wait().expect("it ends").code(), Some(1));
+
+    drop(serving);
+    next(&mut socket, "event", is_up(false));
+    assert_eq!(ask(&mut socket, 12, json!({ "do": "guided", "kind": "arm" }))["ok"], json!(false));
+    assert!(connected.0.try_wait().expect("a process").is_none(), "it waits for the vehicle");
+    let port = format!("sealed={}", place.parse::<SocketAddr>().expect("an address").port());
+    let (_serving, _) = Program::serve(&folder, &port, &["--key", &ours]);
+    next(&mut socket, "event", is_up(true));
+    assert_eq!(ask(&mut socket, 13, json!({ "do": "param_get", "name": "eskf.gate" }))["value"], json!(4.0));
+}
+
+#[test]
+fn a_flight_is_recorded_by_radio_and_replays_bit_for_bit() {
+    let folder = folder("connect", "sealed_record");
+    let ours = key(&folder, "ours", 1);
+    let (_serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
+    recorded(&folder, &format!("udp:{place}"), &["--key", &ours]);
+}
+
+/// Between a station and its vehicle: of a hundred datagrams each way 30 are lost, five are spoilt in one bit and five come twice.
+struct Relay {
+    place: SocketAddr,
+    is_over: Arc<AtomicBool>,
+}
+
+impl Relay {
+    fn to(vehicle: &str) -> Self {
+        let (near, far) = (UdpSocket::bind("127.0.0.1:0"), UdpSocket::bind("127.0.0.1:0"));
+        let (near, far) = (near.expect("a port"), far.expect("a port"));
+        far.connect(vehicle).expect("an address");
+        let relay = Self { place: near.local_addr().expect("an address"), is_over: Arc::new(AtomicBool::new(false)) };
+        let is_over = relay.is_over.clone();
+        for socket in [&near, &far] {
+            socket.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
+        }
+        std::thread::spawn(move || {
+            let (mut random, mut station, mut room) = (1_u64, None, [0; 512]);
+            while !is_over.load(Ordering::Relaxed) {
+                if let Ok((length, from)) = near.recv_from(&mut room) {
+                    station = Some(from);
+                    pass(&mut random, &mut room[..length], |bytes| drop(far.send(bytes)));
+                }
+                match far.recv(&mut room) {
+                    Ok(length) => pass(&mut random, &mut room[..length], |bytes| {
+                        station.into_iter().for_each(|station| drop(near.send_to(bytes, station)));
+                    }),
+                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                    // The vehicle is not there.
+                    Err(_) => std::thread::sleep(Duration::from_millis(1)),
+                }
+            }
+        });
+        relay
+    }
+}
+
+impl Drop for Relay {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+    }
+}
+
+fn pass(random: &mut u64, bytes: &mut [u8], send: impl Fn(&[u8])) {
+    let mut below = |limit: u64| {
+        // Knuth's generator, in its upper bits.
+        *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*random >> 33) % limit
+    };
+    match below(100) {
+        0..30 => {}
+        30..35 if !bytes.is_empty() => {
+            let place = below(bytes.len() as u64) as usize;
+            bytes[place] ^= 1 << below(8);
+            send(bytes);
+        }
+        35..40 => (0..2).for_each(|_| send(bytes)),
+        _ => send(bytes),
+    }
+}
+
+#[test]
+fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
+    let folder = folder("connect", "sealed_lossy");
+    let ours = key(&folder, "ours", 1);
+    let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
+    let relay = Relay::to(&vehicle);
+    let (_connected, mut socket) = connect(&folder, &format!("udp:{}", relay.place), &["--key", &ours]);
+    let hello = next(&mut socket, "hello", |_| true);
+    next(&mut socket, "event", is_up(true));
+    let down = see(&mut socket, &hello);
+    // By then it is calibrated.
+    passes(&mut socket, 8);
+    fly(&mut socket, down);
+    assert_eq!(ask(&mut socket, 10, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(true));
+    // It falls: with somebody there it does not land by itself.
+    assert!(is_at(&mut socket, down, -0.1..0.1, Duration::from_secs(3)));
+}
+
+#[test]
+fn a_key_is_for_the_radio_and_the_radio_wants_one() {
+    let folder = folder("connect", "keys");
+    let ours = key(&folder, "ours", 1);
+    for arguments in [&["connect", "udp:127.0.0.1"][..], &["connect", "tcp:127.0.0.1:5763", "--key", &ours]] {
+        let mut program = Program::start(&folder, arguments);
+        assert_eq!(program.0.wait().expect("it ends").code(), Some(2), "{arguments:?}");
+    }
+}
