@@ -9,6 +9,7 @@
 //! | [`radio_desk`] | the same over the secure link, and topics that a station wants to see |
 //! | [`Requested`] | parameters of a vehicle that takes requests for them |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
+//! | [`watches`] | the topics that a station wants to see, and when each is due |
 //! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
 //! | [`mission`] | steps that a vehicle flies one after the other |
 //! | [`tape`] | who is sent the flight record |
@@ -50,7 +51,7 @@ pub mod telemetry;
 pub mod tello;
 mod version;
 pub mod view;
-mod watches;
+pub mod watches;
 
 pub use cockpit::{Cockpit, Request};
 pub use data_stream::DataStream;
