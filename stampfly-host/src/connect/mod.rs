@@ -3,7 +3,8 @@
 //! | part | what it does |
 //! |---|---|
 //! | [`Place`] | where the line is, and how it is opened |
-//! | `sealed.rs` | a line of sealed frames, for a vehicle in a network |
+//! | [`RadioPlace`] | where a vehicle in a network is, and the sealed frames that go there |
+//! | `way.rs` | one or the other |
 //! | `translation.rs` | what a cable says and what those frames say |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
 //! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
@@ -16,8 +17,10 @@ mod record;
 mod sealed;
 pub mod station;
 mod translation;
+mod way;
 
 pub use place::{Line, Place, PlaceError};
+pub use sealed::{RadioPlace, RadioPlaceError};
 
 use crate::serve::OpenPorts;
 use log::Log;
@@ -35,6 +38,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
+use way::{Open, Way};
 
 /// Where other programs find the vehicle.
 pub const PORTS: &[PortSpec] = &[PortSpec::PAGE, PortSpec::MAVLINK_UDP, PortSpec::MAVLINK_TCP];
@@ -98,9 +102,7 @@ pub struct Carried {
 
 /// Between a line, pages and programs.
 pub struct Bridge<V: Vehicle> {
-    place: Place,
-    baud: u32,
-    key: Option<Key>,
+    way: Way,
     station: Station,
     ends: Ends<V>,
     state: State,
@@ -204,6 +206,23 @@ impl<V: Vehicle> Bridge<V> {
     /// Of a vehicle whose line is there, for this hub of one vehicle and these open [`PORTS`]. Logs go into the folder.
     #[must_use]
     pub fn new(place: Place, baud: u32, hub: Arc<Hub>, ports: Arc<OpenPorts>, folder: PathBuf) -> Option<Self> {
+        Self::by(Way::Line(place, baud), hub, ports, folder)
+    }
+
+    /// The same of a vehicle that is there in a network and has this key.
+    #[must_use]
+    pub fn by_radio(
+        place: RadioPlace,
+        key: Key,
+        hub: Arc<Hub>,
+        ports: Arc<OpenPorts>,
+        folder: PathBuf,
+    ) -> Option<Self> {
+        let bridge = Self::by(Way::Radio(place, key), hub, ports, folder)?;
+        Some(Self { station: bridge.station.by_radio(), ..bridge })
+    }
+
+    fn by(way: Way, hub: Arc<Hub>, ports: Arc<OpenPorts>, folder: PathBuf) -> Option<Self> {
         let settings = V::parameters(&V::default_config());
         let watch = hub.witness(ONLY)?;
         let known = vec![false; settings.len()];
@@ -222,13 +241,7 @@ impl<V: Vehicle> Bridge<V> {
             clock: stampfly_types::Instant::ZERO,
             restarted: false,
         };
-        Some(Self { place, baud, key: None, station, ends, state: State::Up, shown: BTreeMap::new() })
-    }
-
-    /// The same, with the key of a vehicle that speaks in sealed frames.
-    #[must_use]
-    pub fn with_key(self, key: Key) -> Self {
-        Self { key: Some(key), station: self.station.by_radio(), ..self }
+        Some(Self { way, station, ends, state: State::Up, shown: BTreeMap::new() })
     }
 
     /// The same, which asks the vehicle for its compact flight record and writes it into a file.
@@ -244,16 +257,16 @@ impl<V: Vehicle> Bridge<V> {
     pub fn run(mut self, until: Option<Instant>) -> Carried {
         let mut was_heard = false;
         while !self.ends.ports.are_closed() && until.is_none_or(|until| Instant::now() < until) {
-            match self.place.open(self.baud, self.key.as_ref()) {
+            match self.way.open() {
                 Ok(line) => {
                     let why = self.carry(line, until);
                     was_heard |= self.station.heard().is_some();
                     let Some(why) = why else { break };
                     let Self { station, ends, .. } = &mut self;
                     station.lost(&mut |said| ends.take(said));
-                    self.change(State::Away, format!("the line at {} is gone: {why}", self.place));
+                    self.change(State::Away, format!("the line at {} is gone: {why}", self.way));
                 }
-                Err(error) => self.change(State::Away, format!("nothing at {}: {error}", self.place)),
+                Err(error) => self.change(State::Away, format!("nothing at {}: {error}", self.way)),
             }
             self.wait();
         }
@@ -282,7 +295,7 @@ impl<V: Vehicle> Bridge<V> {
     }
 
     /// Carries what is said over an open line. Returns why it is gone; `None` when it is over.
-    fn carry(&mut self, mut line: Line, until: Option<Instant>) -> Option<std::io::Error> {
+    fn carry(&mut self, mut line: Open, until: Option<Instant>) -> Option<std::io::Error> {
         let opened = Instant::now();
         let (mut part, mut put) = (vec![0; PART], Vec::new());
         let (mut looked, mut told) = (opened - LOOK, opened - TOLD);
@@ -322,11 +335,11 @@ impl<V: Vehicle> Bridge<V> {
             }
             station.poll(now, &mut put, &mut |said| ends.take(said));
             if is_up {
-                self.change(State::Up, format!("heard at {}", self.place));
+                self.change(State::Up, format!("heard at {}", self.way));
             } else if self.state == State::Up || now.duration_since(opened) >= SILENCE {
                 // Said once: a line that opens begins in this state.
                 if core::mem::replace(&mut self.state, State::Away) != State::Away {
-                    let text = format!("the line at {} is open, and no vehicle answers", self.place);
+                    let text = format!("the line at {} is open, and no vehicle answers", self.way);
                     self.ends.hub.tell_all(ONLY, &Event::Link { up: false, text });
                 }
             }

@@ -1,9 +1,6 @@
-//! Where a vehicle's line is: a serial port of this computer, a TCP port that carries one, or the vehicle itself in a network.
+//! Where a vehicle's line is: a serial port of this computer, or a TCP port that carries one.
 
-use super::sealed::Sealed;
 use serialport::{SerialPort, SerialPortBuilder};
-use stampfly_link::secure::Key;
-use stampfly_services::network::SEALED_UDP;
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -23,7 +20,6 @@ const CONNECTED: Duration = Duration::from_secs(2);
 /// use stampfly_host::connect::Place;
 /// assert_eq!("/dev/ttyACM0".parse(), Ok(Place::Serial("/dev/ttyACM0".into())));
 /// assert_eq!("tcp:localhost:5763".parse(), Ok(Place::Tcp("localhost:5763".into())));
-/// assert_eq!("udp:192.168.4.23".parse(), Ok(Place::Udp("192.168.4.23:14560".into())));
 /// assert!("tcp:5763".parse::<Place>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,8 +28,6 @@ pub enum Place {
     Serial(String),
     /// Host and port.
     Tcp(String),
-    /// Host and port of a vehicle that speaks in sealed frames.
-    Udp(String),
 }
 
 /// The text says no place.
@@ -42,7 +36,7 @@ pub struct PlaceError(String);
 
 impl fmt::Display for PlaceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "'{}' is neither a serial port nor tcp:HOST:PORT nor udp:HOST", self.0)
+        write!(f, "'{}' is neither a serial port nor tcp:HOST:PORT", self.0)
     }
 }
 
@@ -53,18 +47,14 @@ impl FromStr for Place {
 
     fn from_str(text: &str) -> Result<Self, PlaceError> {
         let wrong = || PlaceError(text.to_owned());
-        let is_address = |address: &str| {
-            address.rsplit_once(':').is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok())
-        };
-        match text.split_once(':') {
-            Some(("tcp", address)) if is_address(address) => Ok(Self::Tcp(address.to_owned())),
-            Some(("udp", address)) if is_address(address) => Ok(Self::Udp(address.to_owned())),
-            Some(("udp", host)) if !host.is_empty() && !host.contains(':') => {
-                Ok(Self::Udp(format!("{host}:{SEALED_UDP}")))
+        match text.strip_prefix("tcp:") {
+            None if text.is_empty() => Err(wrong()),
+            None => Ok(Self::Serial(text.to_owned())),
+            Some(address) => {
+                let (host, port) = address.rsplit_once(':').ok_or_else(wrong)?;
+                let is_one = !host.is_empty() && port.parse::<u16>().is_ok();
+                if is_one { Ok(Self::Tcp(address.to_owned())) } else { Err(wrong()) }
             }
-            Some(("tcp" | "udp", _)) => Err(wrong()),
-            _ if text.is_empty() => Err(wrong()),
-            _ => Ok(Self::Serial(text.to_owned())),
         }
     }
 }
@@ -74,22 +64,17 @@ impl fmt::Display for Place {
         match self {
             Self::Serial(path) => f.write_str(path),
             Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Udp(address) => write!(f, "udp:{address}"),
         }
     }
 }
 
 impl Place {
-    /// Opens it. USB has no speed, and takes any; a UART has its own. Sealed frames want the vehicle's key.
+    /// Opens it. USB has no speed, and takes any; a UART has its own.
     ///
     /// # Errors
     /// When nothing is there, or somebody else has it.
-    pub fn open(&self, baud: u32, key: Option<&Key>) -> io::Result<Line> {
+    pub fn open(&self, baud: u32) -> io::Result<Line> {
         match self {
-            Self::Udp(address) => {
-                let key = key.ok_or_else(|| io::Error::new(ErrorKind::PermissionDenied, "there is no key"))?;
-                Ok(Line::Sealed(Box::new(Sealed::open(address, key, LOOK)?)))
-            }
             Self::Serial(path) => {
                 // Its two other wires are left as they are: an ESP32-S3 restarts, or starts its boot loader, by them.
                 // A pseudo-terminal is held by whoever made it; no other port has two users.
@@ -131,8 +116,6 @@ pub enum Line {
     Serial(Box<dyn SerialPort>),
     /// A connection.
     Tcp(TcpStream),
-    /// Sealed frames.
-    Sealed(Box<Sealed>),
 }
 
 impl fmt::Debug for Line {
@@ -153,8 +136,6 @@ impl Line {
                 port.read(room)
             }
             Self::Tcp(stream) => stream.read(room),
-            // Nobody says that a vehicle is gone: it is silent.
-            Self::Sealed(sealed) => return sealed.read(room),
         };
         match read {
             // A connection that was closed, a device that was pulled out.
@@ -180,10 +161,6 @@ impl Line {
                 port.write_all(bytes)
             }
             Self::Tcp(stream) => stream.write_all(bytes),
-            Self::Sealed(sealed) => {
-                sealed.write(bytes);
-                Ok(())
-            }
         }
     }
 }

@@ -4,9 +4,12 @@
 
 use super::translation::Translation;
 use stampfly_link::secure::{Key, MAX_FRAME, Payload, Station};
+use stampfly_services::network::SEALED_UDP;
+use std::fmt;
 use std::hash::{BuildHasher as _, RandomState};
 use std::io;
 use std::net::{ToSocketAddrs as _, UdpSocket};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 /// Between two signs of life. A vehicle looks for another station after half a second of silence.
@@ -19,6 +22,50 @@ const KILLING: Duration = Duration::from_millis(300);
 const AT_ONCE: usize = 64;
 /// A topic that no vehicle has: to end watching it is a sign of life that does nothing.
 const NO_TOPIC: u16 = u16::MAX;
+
+/// Where a vehicle is that has joined a network: host and port.
+///
+/// ```
+/// use stampfly_host::connect::RadioPlace;
+/// let place: RadioPlace = "udp:192.168.4.23".parse()?;
+/// assert_eq!(place.to_string(), "udp:192.168.4.23:14560");
+/// assert_eq!("udp:vehicle:14560".parse::<RadioPlace>()?.to_string(), "udp:vehicle:14560");
+/// assert!("udp:".parse::<RadioPlace>().is_err() && "192.168.4.23".parse::<RadioPlace>().is_err());
+/// # Ok::<(), stampfly_host::connect::RadioPlaceError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RadioPlace(String);
+
+/// The text says no such place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RadioPlaceError(String);
+
+impl fmt::Display for RadioPlaceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "'{}' is not udp:HOST or udp:HOST:PORT", self.0)
+    }
+}
+
+impl std::error::Error for RadioPlaceError {}
+
+impl FromStr for RadioPlace {
+    type Err = RadioPlaceError;
+
+    fn from_str(text: &str) -> Result<Self, RadioPlaceError> {
+        let address = text.strip_prefix("udp:").filter(|address| !address.is_empty());
+        let address = address.and_then(|address| match address.rsplit_once(':') {
+            None => Some(format!("{address}:{SEALED_UDP}")),
+            Some((host, port)) => (!host.is_empty() && port.parse::<u16>().is_ok()).then(|| address.to_owned()),
+        });
+        address.map(Self).ok_or_else(|| RadioPlaceError(text.to_owned()))
+    }
+}
+
+impl fmt::Display for RadioPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "udp:{}", self.0)
+    }
+}
 
 /// The line.
 pub struct Sealed {
@@ -33,8 +80,8 @@ pub struct Sealed {
 }
 
 impl Sealed {
-    /// To the vehicle at this address that has this key. A look waits so long for something to come.
-    pub fn open(address: &str, key: &Key, look: Duration) -> io::Result<Self> {
+    /// To the vehicle at this place that has this key. A look waits so long for something to come.
+    pub fn open(RadioPlace(address): &RadioPlace, key: &Key, look: Duration) -> io::Result<Self> {
         let place = address.to_socket_addrs()?.next().ok_or(io::ErrorKind::NotFound)?;
         let socket = UdpSocket::bind(if place.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
         socket.connect(place)?;

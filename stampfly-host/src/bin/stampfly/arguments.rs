@@ -8,7 +8,7 @@ mod scene;
 
 pub use campaign::{CampaignOptions, Engine};
 pub use estimate::EstimateOptions;
-pub use live::{ConnectOptions, DemoOptions, HilOptions, ServeOptions};
+pub use live::{ConnectOptions, DemoOptions, HilOptions, ServeOptions, VehiclePlace};
 pub use log::{GoldenOptions, LogCommand, ReplayOptions};
 pub use scene::{FlyOptions, SceneOptions};
 

@@ -1,12 +1,13 @@
 //! `stampfly connect`: the ground station's page for a real vehicle, and at a cable MAVLink's ports.
 
-use crate::arguments::ConnectOptions;
+use crate::arguments::{ConnectOptions, VehiclePlace};
 use crate::doctor::port_of;
 use crate::failure::Failure;
-use stampfly_host::connect::{Bridge, PORTS, Place};
+use stampfly_host::connect::{Bridge, PORTS, Place, RadioPlace};
 use stampfly_host::ground::{Hub, Limits, Server, VehicleCard};
 use stampfly_host::serve::{Key, OpenPorts, PortOption};
 use stampfly_host::vehicles::{self, ForVehicle};
+use stampfly_link::secure;
 use stampfly_sim::vehicle::{Transport, Vehicle};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -20,35 +21,42 @@ const OFFERS: &[&str] =
 const BY_RADIO: usize = OFFERS.len() - 2;
 
 pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
-    let place = match &options.place {
-        Some(place) => place.clone(),
-        None => match port_of(None) {
-            Some(path) => Place::Serial(path),
+    let way = match (&options.place, &options.key) {
+        (Some(VehiclePlace::Line(place)), None) => Way::Line(place.clone()),
+        (Some(VehiclePlace::Radio(place)), Some(file)) => Way::Radio(place.clone(), Key::read(file)?.sealing()?),
+        (None, None) => match port_of(None) {
+            Some(path) => Way::Line(Place::Serial(path)),
             None => return Ok(ExitCode::from(USAGE)),
         },
+        _ => {
+            eprintln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
+            return Ok(ExitCode::from(USAGE));
+        }
     };
-    let is_radio = matches!(place, Place::Udp(_));
-    if is_radio != options.key.is_some() {
-        eprintln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
-        return Ok(ExitCode::from(USAGE));
-    }
-    vehicles::with(&options.vehicle.name, Connect(options, place))?
+    vehicles::with(&options.vehicle.name, Connect(options, way))?
 }
 
-struct Connect<'o>(&'o ConnectOptions, Place);
+/// A way to the vehicle, with what it takes.
+enum Way {
+    Line(Place),
+    Radio(RadioPlace, secure::Key),
+}
+
+struct Connect<'o>(&'o ConnectOptions, Way);
 
 impl ForVehicle for Connect<'_> {
     type Output = Result<ExitCode, Failure>;
 
     fn run<V: Vehicle>(self) -> Self::Output {
-        let Self(options, place) = self;
+        let Self(options, way) = self;
         // Nobody speaks MAVLink in sealed frames: in a network the vehicle has ports of its own for that.
-        let (specs, offers) = match place {
-            Place::Udp(_) => (PORTS.get(..1).unwrap_or_default(), OFFERS.get(..BY_RADIO).unwrap_or_default()),
-            _ => (PORTS, OFFERS),
+        let (specs, offers, place) = match &way {
+            Way::Line(place) => (PORTS, OFFERS, place.to_string()),
+            Way::Radio(place, _) => {
+                (PORTS.get(..1).unwrap_or_default(), OFFERS.get(..BY_RADIO).unwrap_or_default(), place.to_string())
+            }
         };
         PortOption::check(&options.port, specs, "a connected vehicle")?;
-        let key = options.key.as_deref().map(Key::read).transpose()?.map(|key| key.sealing()).transpose()?;
         std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
         let hub = Hub::new(vec![VehicleCard {
             faults: &[],
@@ -81,11 +89,12 @@ impl ForVehicle for Connect<'_> {
         let closing = ports.clone();
         ctrlc::set_handler(move || closing.close())?;
         let until = options.seconds.map(|seconds| Instant::now() + Duration::from_secs_f32(seconds));
-        let bridge = Bridge::<V>::new(place, options.baud, hub, ports, options.out.clone());
+        let folder = options.out.clone();
+        let bridge = match way {
+            Way::Line(place) => Bridge::<V>::new(place, options.baud, hub, ports, folder),
+            Way::Radio(place, key) => Bridge::by_radio(place, key, hub, ports, folder),
+        };
         let mut bridge = bridge.ok_or("the ground station does not know this vehicle")?;
-        if let Some(key) = key {
-            bridge = bridge.with_key(key);
-        }
         if let Some(file) = &options.record {
             let failed = |error| format!("{}: {error}", file.display());
             bridge = bridge.recording(file.clone()).map_err(failed)?;

@@ -2,10 +2,12 @@
 
 use super::{FlyOptions, SceneOptions, VehicleOption, seconds};
 use clap::Args;
-use stampfly_host::connect::Place;
+use stampfly_host::connect::{Place, RadioPlace};
 use stampfly_host::serve::PortOption;
+use std::error::Error;
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Options of `serve`.
 #[derive(Clone, Debug, Args)]
@@ -48,13 +50,28 @@ pub struct ServeOptions {
     pub speed: f32,
 }
 
+/// Where a real vehicle is.
+#[derive(Clone, Debug)]
+pub enum VehiclePlace {
+    Line(Place),
+    Radio(RadioPlace),
+}
+
+impl FromStr for VehiclePlace {
+    type Err = Box<dyn Error + Send + Sync>;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(if text.starts_with("udp:") { Self::Radio(text.parse()?) } else { Self::Line(text.parse()?) })
+    }
+}
+
 /// Options of `connect`.
 #[derive(Clone, Debug, Args)]
 pub struct ConnectOptions {
     /// The vehicle's serial port, such as /dev/ttyACM0, or tcp:HOST:PORT, or udp:HOST for a vehicle in a Wi-Fi network, which wants its `--key`. Without this: the only
     /// serial port that looks like a vehicle's. One that is not there, or not any more, is waited for.
     #[arg(value_name = "PATH|tcp:HOST:PORT|udp:HOST")]
-    pub place: Option<Place>,
+    pub place: Option<VehiclePlace>,
     /// A file with the vehicle's key, as its console's `key` shows it, or as 64 hexadecimal digits. For udp:HOST.
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
