@@ -13,11 +13,15 @@ const AT_ONCE: usize = 8;
 #[derive(Clone, Copy, Debug)]
 struct Watch {
     topic: u16,
-    period: Duration,
+    /// ms. In the numbers of the wire: a board has two of these for each topic.
+    period: u16,
     next: Instant,
-    /// Instant of the sample that was sent last.
-    told: Option<Instant>,
+    /// Instant of the sample that was sent last, or [`NEVER`].
+    told: Instant,
 }
+
+/// No sample is of this instant.
+const NEVER: Instant = Instant::from_micros(u64::MAX);
 
 /// Up to `N` of them.
 #[derive(Clone, Debug, Default)]
@@ -38,18 +42,17 @@ impl<const N: usize> Watches<N> {
     /// From now on this topic every `period` ms, or with zero not any more. `false` when there is no room.
     pub fn watch(&mut self, now: Instant, topic: u16, period: u16) -> bool {
         let known = self.all.iter().position(|watch| watch.topic == topic);
-        let period = Duration::from_millis(period.into());
         match (known, period) {
-            (Some(place), Duration::ZERO) => {
+            (Some(place), 0) => {
                 self.all.swap_remove(place);
                 true
             }
-            (None, Duration::ZERO) => true,
+            (None, 0) => true,
             (Some(place), _) => {
                 self.all.get_mut(place).into_iter().for_each(|watch| watch.period = period);
                 true
             }
-            (None, _) => self.all.push(Watch { topic, period, next: now, told: None }).is_ok(),
+            (None, _) => self.all.push(Watch { topic, period, next: now, told: NEVER }).is_ok(),
         }
     }
 
@@ -72,13 +75,14 @@ impl<const N: usize> Watches<N> {
         for step in 0..length {
             let place = (self.first + step) % length.max(1);
             let Some(watch) = self.all.get_mut(place).filter(|watch| now >= watch.next) else { continue };
-            let Some((at, words)) = samples.words(watch.topic.into()).filter(|(at, _)| Some(*at) != watch.told) else {
+            let Some((at, words)) = samples.words(watch.topic.into()).filter(|(at, _)| *at != watch.told) else {
                 continue;
             };
-            watch.told = Some(at);
+            watch.told = at;
             // From the plan, so that late calls do not add up; but never two at once.
-            let planned = watch.next + watch.period;
-            watch.next = if planned > now { planned } else { now + watch.period };
+            let period = Duration::from_millis(watch.period.into());
+            let planned = watch.next + period;
+            watch.next = if planned > now { planned } else { now + period };
             self.first = place + 1;
             self.count = self.count.wrapping_add(1);
             return Some((watch.topic, at, words));
