@@ -24,7 +24,7 @@ const SCRIPTS: [(&str, &[&str], &[&str]); 15] = [
     ("mavlink_square.py", &["{usb}"], &[]),
     ("mavsdk_mission.py", &["udpin://{mavlink-udp}"], &[]),
     ("mavlink_calibrate.py", &["tcp:{mavlink-tcp}"], &[]),
-    ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all"]),
+    ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all", "--port", "sealed=0"]),
     ("yamspy_tune.py", &["{msp-serial}"], &[]),
     ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"], &[]),
     ("read_streams.py", &["{telemetry#}", "{stream}"], &[]),
