@@ -35,7 +35,7 @@ const TICK: u64 = 2_500;
 const OPENING: Duration = Duration::from_micros(112);
 const LOOK: Duration = Duration::from_micros(5);
 /// A packet that is nearly full.
-const LEAST_CHUNK: usize = MAX_BODY - 32;
+pub(super) const LEAST_CHUNK: usize = MAX_BODY - 32;
 /// Between two questions for the flight record.
 const ASKS: Duration = Duration::from_secs(1);
 

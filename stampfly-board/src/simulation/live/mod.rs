@@ -27,6 +27,7 @@ pub(super) use services::Services;
 
 use crate::VehicleConfig;
 use crate::console::Newest;
+use crate::simulation::air::LEAST_CHUNK;
 use crate::simulation::faults::FAULTS;
 use crate::topics::{Id, TOPICS};
 use stampfly_drivers::chip::pmw3901;
@@ -127,7 +128,7 @@ impl Seen {
         let (mut tape, mut waiting) = (self.tape.borrow_mut(), self.chunks.borrow_mut());
         tape.poll(now, chunks);
         let Some(line) = tape.line() else { return waiting.clear() };
-        let (longest, least) = if line.port == SEALED { (MAX_BODY, MAX_BODY - 32) } else { (BODY, LEAST) };
+        let (longest, least) = if line.port == SEALED { (MAX_BODY, LEAST_CHUNK) } else { (BODY, LEAST) };
         let mut room = [0; BODY];
         let Some(room) = room.get_mut(..longest) else { return };
         while waiting.len() < WAITING
