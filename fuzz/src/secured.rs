@@ -131,7 +131,7 @@ impl Scene {
         match self.vehicle.receive(self.now, Address([2; 6]), &mut frame) {
             Ok(Heard::Authentic(received)) => {
                 check(&Some(received.payload), changed);
-                let changes = matches!(received.payload, Payload::WriteParameter { .. } | Payload::Line(_));
+                let changes = matches!(received.payload, Payload::WriteParameter { .. } | Payload::Line(_) | Payload::Question { .. });
                 assert!(!self.armed || !changes, "an armed vehicle takes no such thing");
                 assert!(received.age <= stampfly_link::secure::MAX_AGE || received.payload.is_kill());
                 assert_eq!(self.vehicle.age(self.now), Some(Duration::ZERO));

@@ -7,7 +7,7 @@ use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
 use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
-use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
@@ -22,8 +22,6 @@ pub struct Link<'b> {
     /// Whom it listens to, and what it has refused.
     pub guarded: Guarded,
     pub(crate) ends: LinkEnds<'b>,
-    /// The newest command's frame, and whether it was taken: to be acknowledged.
-    commanded: Option<(u32, bool)>,
     counter: u8,
 }
 
@@ -34,7 +32,7 @@ pub enum Outgoing {
     Call,
     /// A part of the secure session's handshake, to everybody.
     Handshake,
-    /// What became of a command, to the station that sent it.
+    /// What became of a command, or that it is not done while armed, to the station that sent it.
     Acknowledgement,
     /// Telemetry, to who flies: sealed, by turns for a display and for a program.
     Telemetry,
@@ -49,7 +47,7 @@ impl<'b> Link<'b> {
     /// A link whose sessions are at their beginning.
     #[must_use]
     pub const fn new(guarded: Guarded, ends: LinkEnds<'b>) -> Self {
-        Self { guarded, ends, commanded: None, counter: 0 }
+        Self { guarded, ends, counter: 0 }
     }
 
     /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with the key has sent is returned,
@@ -79,16 +77,13 @@ impl<'b> Link<'b> {
 
     /// Publishes what a station with the key has sent, whichever way it came, and returns what is no command.
     pub fn obey<'f>(&mut self, at: Instant, received: Received<'f>) -> Option<Received<'f>> {
-        let command = match received.payload {
-            Payload::Guided(command) => command,
-            Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
-            Payload::Sticks(input) => {
-                self.sticks(at, &input);
-                return None;
-            }
-            _ => return Some(received),
-        };
-        self.commanded = Some((received.counter, self.command(at, command)));
+        if let Payload::Sticks(input) = received.payload {
+            self.sticks(at, &input);
+            return None;
+        }
+        let Some(command) = received.payload.command() else { return Some(received) };
+        let taken = self.command(at, command);
+        self.guarded.acknowledge(&received, taken);
         None
     }
 
@@ -117,10 +112,7 @@ impl<'b> Link<'b> {
                 Some((Address::BROADCAST, put(room, &self.guarded.beacon(now)?)?))
             }
             Outgoing::Handshake => Some((Address::BROADCAST, self.guarded.transmit(now, random, room)?)),
-            Outgoing::Acknowledgement => {
-                let (counter, taken) = self.commanded.take()?;
-                self.guarded.seal(now, &Payload::Acknowledgement { counter, taken }, room)
-            }
+            Outgoing::Acknowledgement => self.guarded.seal_acknowledgement(now, room),
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
                 let (at, frame) = self.ends.telemetry.latest().map(|new| (new.at, new.data)).unwrap_or_default();

@@ -523,7 +523,8 @@ fn l10_a_station_sends_nothing_that_would_be_refused() {
 #[test]
 fn l11_an_armed_vehicle_takes_no_parameters_and_no_lines() {
     let mut air = Air::joined(11);
-    let commands = [Payload::WriteParameter { index: 1, value: 2.0 }, Payload::Line("format")];
+    let question = Payload::Question { number: 1, from: 0, line: "format" };
+    let commands = [Payload::WriteParameter { index: 1, value: 2.0 }, Payload::Line("format"), question];
     let asks = Payload::ReadParameter { index: 1 };
     for (armed, expected) in [(false, Ok(true)), (true, Err(Refused::Armed)), (false, Ok(true))] {
         air.vehicle.set_armed(armed);

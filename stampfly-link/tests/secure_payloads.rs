@@ -48,6 +48,10 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
         0.0f32..=100.0,
         0.0f32..=3_600.0,
     );
+    let guided = guided.prop_map(|(kind, position, yaw, speed, dwell)| {
+        let (yaw, speed, dwell) = (normal(yaw), normal(speed), normal(dwell));
+        GuidedCommand { kind, position, yaw, speed, dwell }
+    });
     let value = any::<f32>().prop_filter("finite", |value| value.is_finite()).prop_map(normal);
     let words = prop::collection::vec(any::<[u8; 4]>(), 0..=Sample::MAX_WORDS).prop_map(|words| &*words.leak());
     prop_oneof![
@@ -56,14 +60,21 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
         sticks.prop_map(|([roll, pitch, yaw, throttle], mode, [arm, kill])| {
             Payload::Sticks(PilotInput { roll, pitch, yaw, throttle, mode, arm, kill })
         }),
-        guided.prop_map(|(kind, position, yaw, speed, dwell)| {
-            let (yaw, speed, dwell) = (normal(yaw), normal(speed), normal(dwell));
-            Payload::Guided(GuidedCommand { kind, position, yaw, speed, dwell })
+        (any::<Option<u32>>(), guided).prop_map(|(number, command)| match number {
+            None => Payload::Guided(command),
+            Some(number) => Payload::Numbered { number, command },
         }),
         Just(Payload::Kill),
         any::<u16>().prop_map(|index| Payload::ReadParameter { index }),
         (any::<u16>(), value.clone()).prop_map(|(index, value)| Payload::WriteParameter { index, value }),
         text(MAX_BODY).prop_map(Payload::Line),
+        (any::<u32>(), any::<u16>(), text(MAX_BODY - 6)).prop_map(|(number, from, line)| Payload::Question {
+            number,
+            from,
+            line
+        }),
+        (any::<u32>(), any::<u16>(), text(MAX_BODY - 7), any::<bool>())
+            .prop_map(|(number, from, text, last)| Payload::Part { number, from, text, last }),
         (any::<u16>(), any::<u16>()).prop_map(|(topic, period)| Payload::Watch { topic, period }),
         telemetry().prop_map(Payload::Telemetry),
         (any::<u16>(), value, any::<bool>()).prop_map(|(index, value, taken)| Payload::Parameter {

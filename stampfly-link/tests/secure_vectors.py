@@ -76,7 +76,10 @@ def vectors():
         ("reply", by, 0xB0, 4, 20, b"\x01" + text),
         ("sample", by, 0xC0, 5, 20, struct.pack("<HQIII", 12, 1_234_567_890_123, 1, 0xFFFFFFFF, 0x3F800000)),
         ("acknowledgement", by, 0xD0, 6, 20, struct.pack("<IB", 4, 1)),
-        ("longest reply", by, 0xB0, 7, 20, b"\x00" + b"x" * 218),
+        ("numbered", to, 0x13, 8, 20, struct.pack("<IBffffff", 0xDEADBEEF, 4, 1.0, -2.0, -1.5, 0.75, 0.5, 2.0)),
+        ("question", to, 0x31, 9, 20, struct.pack("<IH", 0xDEADBEEF, 240) + text),
+        ("part", by, 0xB1, 7, 20, struct.pack("<IHB", 0xDEADBEEF, 240, 1) + text),
+        ("longest reply", by, 0xB0, 8, 20, b"\x00" + b"x" * 218),
     ]
     frames = [
         {"name": name, "to_vehicle": direction == to, "body": body.hex(),

@@ -9,6 +9,13 @@ use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput
 use stampfly_types::{Instant, Vec3};
 
 const NOW: Instant = Instant::from_millis(20);
+const WAY_POINT: GuidedCommand = GuidedCommand {
+    kind: GuidedKind::WayPoint,
+    position: Vec3::new(1.0, -2.0, -1.5),
+    yaw: 0.75,
+    speed: 0.5,
+    dwell: 2.0,
+};
 
 fn vectors() -> Value {
     serde_json::from_str(include_str!("vectors/secure.json")).expect("the vectors")
@@ -41,17 +48,14 @@ fn payload(name: &str) -> Payload<'static> {
             arm: true,
             ..Default::default()
         }),
-        "guided" => Payload::Guided(GuidedCommand {
-            kind: GuidedKind::WayPoint,
-            position: Vec3::new(1.0, -2.0, -1.5),
-            yaw: 0.75,
-            speed: 0.5,
-            dwell: 2.0,
-        }),
+        "guided" => Payload::Guided(WAY_POINT),
+        "numbered" => Payload::Numbered { number: 0xDEAD_BEEF, command: WAY_POINT },
         "kill" => Payload::Kill,
         "read parameter" => Payload::ReadParameter { index: 513 },
         "write parameter" => Payload::WriteParameter { index: 513, value: -0.125 },
         "line" => Payload::Line(TEXT),
+        "question" => Payload::Question { number: 0xDEAD_BEEF, from: 240, line: TEXT },
+        "part" => Payload::Part { number: 0xDEAD_BEEF, from: 240, text: TEXT, last: true },
         "telemetry" => {
             let degrees = core::f32::consts::PI / 180.0;
             Payload::Telemetry(TelemetryPacket {

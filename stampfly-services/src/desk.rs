@@ -1,7 +1,8 @@
 //! What a station asks besides flying: parameters by their place, and lines of the console, each answered in turn.
 //!
-//! The other end of [`Payload`]'s kinds 20, 21, 30 and 41, for the radio and for a cable. Everything that waits has a bound, and an answer is made when there is room
-//! to send it: a long reply part by part. Not for terminals, which have a [`LineEditor`](stampfly_flight::console::LineEditor).
+//! The other end of [`Payload`]'s kinds 20, 21, 30, 31 and 41, for the radio and for a cable. Everything that waits has a bound, and an answer is made when there is room
+//! to send it: a long reply part by part. A radio loses parts: a [question](Payload::Question) that is said again is answered from where the station has not heard it, and not
+//! done again. Not for terminals, which have a [`LineEditor`](stampfly_flight::console::LineEditor).
 
 use core::fmt;
 use heapless::{Deque, String};
@@ -23,15 +24,33 @@ enum Question {
     Write { index: u16, value: f32 },
 }
 
+/// Who has typed a line: over a cable, which loses nothing, the question with this number; over the radio the line with this one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    Cable(u16),
+    Radio(u32),
+}
+
 /// How far a line is.
 #[derive(Clone, Debug)]
 enum Stage {
-    /// So many bytes of its reply are sent.
-    Answering(usize),
+    /// What it says is being said.
+    Answering,
     /// The board does what was asked.
     Board,
     /// It has said what came of it.
     Done(String<PIECE>),
+}
+
+#[derive(Clone, Debug)]
+struct Line {
+    asked: Asked,
+    text: String<LINE>,
+    stage: Stage,
+    /// Bytes of the reply that are sent.
+    sent: usize,
+    /// Everything is said. A station that has not heard it all asks again.
+    is_said: bool,
 }
 
 /// A reply's part, as it is made: without carriage returns, which are for terminals.
@@ -69,6 +88,17 @@ pub enum Letter {
     },
     /// A reply's part, and whether it is the last.
     Reply(String<PIECE>, bool),
+    /// The same for a question with a number.
+    Part {
+        /// The number of the line.
+        number: u32,
+        /// Bytes of the reply before it.
+        from: u16,
+        /// The part.
+        text: String<PIECE>,
+        /// Is it the last?
+        last: bool,
+    },
 }
 
 impl Letter {
@@ -78,6 +108,9 @@ impl Letter {
         match *payload {
             Payload::Parameter { index, value, taken } => Some(Self::Parameter { index, value, taken }),
             Payload::Reply { text, last } => Some(Self::Reply(String::try_from(text).ok()?, last)),
+            Payload::Part { number, from, text, last } => {
+                Some(Self::Part { number, from, text: String::try_from(text).ok()?, last })
+            }
             _ => None,
         }
     }
@@ -90,6 +123,9 @@ impl Letter {
                 Payload::Parameter { index: *index, value: *value, taken: *taken }
             }
             Self::Reply(text, last) => Payload::Reply { text, last: *last },
+            Self::Part { number, from, text, last } => {
+                Payload::Part { number: *number, from: *from, text, last: *last }
+            }
         }
     }
 }
@@ -101,7 +137,7 @@ impl Letter {
 #[derive(Clone, Debug, Default)]
 pub struct Desk {
     questions: Deque<(u16, Question), QUESTIONS>,
-    line: Option<(u16, String<LINE>, Stage)>,
+    line: Option<Line>,
     record: Option<bool>,
 }
 
@@ -112,23 +148,37 @@ impl Desk {
         Self { questions: Deque::new(), line: None, record: None }
     }
 
-    /// Takes a question. `false` when it is none, or as many wait as there is room for; one line at a time.
+    /// Takes a question. `false` when it is none, or as many wait as there is room for; one line at a time. A line with another number than that
+    /// before ends what is being said of that: its station has given up.
     pub fn ask(&mut self, number: u16, payload: &Payload<'_>) -> bool {
         match *payload {
             Payload::ReadParameter { index } => self.questions.push_back((number, Question::Read { index })).is_ok(),
             Payload::WriteParameter { index, value } => {
                 self.questions.push_back((number, Question::Write { index, value })).is_ok()
             }
-            Payload::Line(text) if self.line.is_none() => {
-                self.line = String::try_from(text).ok().map(|line| (number, line, Stage::Answering(0)));
-                self.line.is_some()
+            Payload::Line(text) if self.line.as_ref().is_none_or(|line| line.is_said) => {
+                self.begin(Asked::Cable(number), text)
             }
+            Payload::Question { number, from, line } => match &mut self.line {
+                Some(again) if again.asked == Asked::Radio(number) => {
+                    (again.sent, again.is_said) = (from.into(), false);
+                    true
+                }
+                Some(Line { stage: Stage::Board, .. }) => false,
+                _ => self.begin(Asked::Radio(number), line),
+            },
             Payload::Record { wanted } => {
                 self.record = Some(wanted);
                 true
             }
             _ => false,
         }
+    }
+
+    fn begin(&mut self, asked: Asked, text: &str) -> bool {
+        let text = String::try_from(text).ok();
+        self.line = text.map(|text| Line { asked, text, stage: Stage::Answering, sent: 0, is_said: false });
+        self.line.is_some()
     }
 
     /// What was said last of the flight record: that it is wanted, or is not; once. It is answered with chunks.
@@ -153,36 +203,38 @@ impl Desk {
             let payload = parameter(vehicle, question)?;
             return Some(Answer { number, payload, request: Request::Nothing });
         }
-        let (number, line, stage) = self.line.as_mut()?;
-        let number = *number;
-        let sent = match stage {
+        let line = self.line.as_mut().filter(|line| !line.is_said)?;
+        room.0.start_at(if let Stage::Done(_) = line.stage { 0 } else { line.sent });
+        let request = match &line.stage {
             Stage::Board => return None,
-            Stage::Answering(sent) => *sent,
+            // An error is the end of the part. Longer replies than one only show something: those lines are answered again.
+            Stage::Answering => answer(&line.text, now, vehicle, room).unwrap_or(Request::Nothing),
             Stage::Done(report) => {
-                room.0.start_at(0);
                 _ = fmt::Write::write_str(room, report);
-                self.line = None;
-                return Some(Answer { number, payload: reply(room, true)?.0, request: Request::Nothing });
+                Request::Nothing
             }
         };
-        room.0.start_at(sent);
-        // An error is the end of the part. Longer replies than one only show something: those lines are answered again.
-        let request = answer(line, now, vehicle, room).unwrap_or(Request::Nothing);
-        let is_cut = room.0.is_cut();
-        let (payload, length) = reply(room, !is_cut && request_is_nothing(&request))?;
-        if is_cut {
-            *stage = Stage::Answering(sent + length);
-        } else if request_is_nothing(&request) {
-            self.line = None;
-        } else {
-            *stage = Stage::Board;
+        let (asked, from) = (line.asked, line.sent);
+        let text = whole(room);
+        // A part that is empty has begun within a character: no station that has heard the answer asks for that.
+        let is_cut = room.0.is_cut() && !text.is_empty() && from <= usize::from(u16::MAX);
+        let last = !is_cut && request_is_nothing(&request);
+        line.sent += text.len();
+        if !request_is_nothing(&request) {
+            line.stage = Stage::Board;
+        } else if last {
+            line.is_said = true;
         }
+        let (number, payload) = match asked {
+            Asked::Cable(number) => (number, Payload::Reply { text, last }),
+            Asked::Radio(number) => (0, Payload::Part { number, from: from as u16, text, last }),
+        };
         Some(Answer { number, payload, request })
     }
 
     /// The board has done what it was asked for, or not.
     pub fn report(&mut self, what: &dyn fmt::Display) {
-        if let Some((_, _, stage @ Stage::Board)) = &mut self.line {
+        if let Some(Line { stage: stage @ Stage::Board, .. }) = &mut self.line {
             let mut text = String::new();
             // What is too long is cut.
             _ = fmt::Write::write_fmt(&mut text, format_args!("{what}"));
@@ -195,14 +247,15 @@ fn request_is_nothing<R>(request: &Request<R>) -> bool {
     matches!(request, Request::Nothing)
 }
 
-/// What is in the room, up to its last whole character, and how long that is.
-fn reply(room: &Room, last: bool) -> Option<(Payload<'_>, usize)> {
+/// What is in the room, up to its last whole character.
+fn whole(room: &Room) -> &str {
     let bytes = room.0.bytes();
-    let whole = match core::str::from_utf8(bytes) {
+    match core::str::from_utf8(bytes) {
         Ok(text) => text,
-        Err(error) => core::str::from_utf8(bytes.get(..error.valid_up_to())?).ok()?,
-    };
-    Some((Payload::Reply { text: whole, last }, whole.len()))
+        Err(error) => {
+            bytes.get(..error.valid_up_to()).and_then(|whole| core::str::from_utf8(whole).ok()).unwrap_or_default()
+        }
+    }
 }
 
 fn parameter<'r, V: Vehicle>(vehicle: &mut V, question: Question) -> Option<Payload<'r>> {

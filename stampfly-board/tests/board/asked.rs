@@ -136,6 +136,31 @@ fn with_the_key_parameters_are_read_and_written_and_the_console_answers() {
     assert!(air.heard.len() > 20 && parameters::all().all(|info| said.contains(info.name)), "{said}");
     assert!(air.heard.last().is_some_and(|text| text.ends_with("last: true }")), "{:?}", air.heard.last());
 
+    // The same by parts, of which every second one is lost: what is missing is asked for.
+    let (mut whole, mut turns) = (String::new(), 0);
+    while !whole.ends_with("|end") {
+        air.heard.clear();
+        let from = whole.len() as u16;
+        air.ask(&Payload::Question { number: 77, from, line: "param list" });
+        air.turn();
+        let is_next = |heard: &&String| turns % 2 == 0 && heard.contains(&format!("number: 77, from: {from},"));
+        if let Some(part) = air.heard.iter().find(is_next) {
+            whole += &part.split('"').nth(1).expect("a text").replace("\\n", "\n").replace("\\t", "\t");
+            whole += if part.ends_with("last: true }") { "|end" } else { "" };
+        }
+        turns += 1;
+        assert!(turns < 1_000, "{whole}");
+    }
+    assert_eq!(whole.trim_end_matches("|end"), said.replace("\\n", "\n").replace("\\t", "\t"));
+
+    // A line that does something does it once, however often its station asks what came of it.
+    air.heard.clear();
+    let save = Payload::Question { number: 78, from: 0, line: "param save" };
+    (0..5).for_each(|_| air.ask(&save));
+    assert_eq!(core::mem::take(&mut air.requests), [Request::SaveParameters]);
+    let done = Payload::Part { number: 78, from: 0, text: "done", last: true };
+    assert!(air.heard.iter().filter(|heard| **heard == format!("{done:?}")).count() > 1, "{:?}", air.heard);
+
     air.heard.clear();
     air.ask(&Payload::Line("param save"));
     air.turn();

@@ -218,8 +218,7 @@ impl<V: Vehicle> Bridge<V> {
         ports: Arc<OpenPorts>,
         folder: PathBuf,
     ) -> Option<Self> {
-        let bridge = Self::by(Way::Radio(place, key), hub, ports, folder)?;
-        Some(Self { station: bridge.station.by_radio(), ..bridge })
+        Self::by(Way::Radio(place, key), hub, ports, folder)
     }
 
     fn by(way: Way, hub: Arc<Hub>, ports: Arc<OpenPorts>, folder: PathBuf) -> Option<Self> {

@@ -16,8 +16,6 @@ use std::time::{Duration, Instant};
 const SIGN: Duration = Duration::from_millis(200);
 /// Between two turns of the handshake.
 const TURN: Duration = Duration::from_millis(20);
-/// A kill is said again in every turn for this long: of sixteen frames one arrives, where every second one is lost.
-const KILLING: Duration = Duration::from_millis(300);
 /// Datagrams taken in one look.
 const AT_ONCE: usize = 64;
 /// A topic that no vehicle has: to end watching it is a sign of life that does nothing.
@@ -75,8 +73,6 @@ pub struct Sealed {
     begun: Instant,
     signed: Option<Instant>,
     turned: Option<Instant>,
-    /// When somebody has asked for a kill.
-    killed: Option<Instant>,
 }
 
 impl Sealed {
@@ -86,8 +82,9 @@ impl Sealed {
         let socket = UdpSocket::bind(if place.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
         socket.connect(place)?;
         socket.set_read_timeout(Some(look))?;
-        let (station, translation) = (Station::new(key.clone()), Translation::new());
-        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None, killed: None })
+        let [a, b, c, d, ..] = fresh();
+        let (station, translation) = (Station::new(key.clone()), Translation::new(u32::from_le_bytes([a, b, c, d])));
+        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None })
     }
 
     /// What has come, after a short wait if nothing has: so many bytes, as a cable has them.
@@ -105,20 +102,15 @@ impl Sealed {
     /// Seals what a cable's bytes say, and sends it.
     pub fn write(&mut self, bytes: &[u8]) {
         let now = self.now();
-        let Self { socket, station, translation, killed, .. } = self;
-        translation.say(bytes, &mut |payload| {
-            if payload.is_kill() {
-                *killed = Some(Instant::now());
-            }
-            seal(socket, station, now, payload)
-        });
+        let Self { socket, station, translation, .. } = self;
+        translation.say(now, bytes, &mut |payload| seal(socket, station, now, payload));
     }
 
     fn now(&self) -> stampfly_types::Instant {
         stampfly_types::Instant::from_micros(self.begun.elapsed().as_micros() as u64)
     }
 
-    /// The handshake's turn, and a sign of life.
+    /// The handshake's turn, what is said again, and a sign of life.
     fn keep_alive(&mut self) {
         let now = self.now();
         let Self { socket, station, translation, .. } = self;
@@ -127,11 +119,7 @@ impl Sealed {
             if let Some(frame) = station.transmit(now, fresh(), &mut room) {
                 send(socket, frame);
             }
-            self.killed = self.killed.filter(|killed| killed.elapsed() < KILLING);
-            if self.killed.is_some() {
-                let counter = seal(socket, station, now, &Payload::Kill);
-                counter.into_iter().for_each(|counter| translation.kill_again(counter));
-            }
+            translation.poll(now, &mut |payload| seal(socket, station, now, payload));
         }
         if is_due(&mut self.signed, SIGN) {
             seal(socket, station, now, &Payload::Watch { topic: NO_TOPIC, period: 0 });
@@ -153,7 +141,7 @@ impl Sealed {
             if let Some(frame) = room.get_mut(..length)
                 && let Ok(Some(received)) = self.station.receive(now, frame)
             {
-                self.translation.hear(&received.payload);
+                self.translation.hear(now, &received.payload);
             }
         }
         self.socket.set_nonblocking(false)

@@ -108,7 +108,6 @@ pub struct Station {
     words: Vec<u32>,
     /// When a sound frame came.
     heard: Option<Instant>,
-    by_radio: bool,
 }
 
 impl Station {
@@ -134,14 +133,7 @@ impl Station {
             is_foreign: false,
             words: Vec::new(),
             heard: None,
-            by_radio: false,
         }
-    }
-
-    /// The same for a vehicle on the secure link: while it is armed, some questions are refused there, and that is silence.
-    #[must_use]
-    pub fn by_radio(self) -> Self {
-        Self { by_radio: true, ..self }
     }
 
     /// When a sound frame came last.
@@ -259,10 +251,19 @@ impl Station {
             },
             Payload::Chunk(chunk) => tell(Said::Chunk(chunk)),
             Payload::Acknowledgement { taken, .. } => {
-                if let Some((Why::Page(client, asked), _)) = self.waiting.remove(&number) {
-                    let answer = if taken { Ok(Reply::text("")) } else { Err("the vehicle has no room for it".into()) };
-                    tell(Said::Answer(client, asked, answer));
-                }
+                let line = self.line.take_if(|(typed, _)| typed.number == number);
+                let line = line.map(|(Typed { client, asked, .. }, _)| (client, asked));
+                let asked = line.or_else(|| match self.waiting.remove(&number)?.0 {
+                    Why::Page(client, asked) => Some((client, asked)),
+                    Why::List(_) => None,
+                });
+                let Some((client, asked)) = asked else { return };
+                let answer = match (taken, &asked.ask) {
+                    (true, _) => Ok(Reply::text("")),
+                    (false, Ask::Guided(_)) => Err("the vehicle has no room for it".into()),
+                    (false, _) => Err("by radio the vehicle does this only while it is disarmed".into()),
+                };
+                tell(Said::Answer(client, asked, answer));
             }
             _ => {}
         }
@@ -373,21 +374,16 @@ impl Station {
     /// Answers what has waited too long, or without a time everything.
     fn expire(&mut self, now: Option<Instant>, tell: Tell<'_>) {
         let late = |since: Instant| now.is_none_or(|now| now.duration_since(since) > PATIENCE);
-        let by_radio = self.by_radio;
-        let silent = |asked: &Asked| match (now, &asked.ask) {
-            (None, _) => Err("the line to the vehicle is gone".into()),
-            (Some(_), Ask::Console { .. } | Ask::ParamSave {} | Ask::ParamSet { .. }) if by_radio => {
-                Err("the vehicle does not answer; by radio it does this only while it is disarmed".into())
-            }
-            (Some(_), _) => Err("the vehicle does not answer".into()),
+        let silent = || match now {
+            None => Err("the line to the vehicle is gone".into()),
+            Some(_) => Err("the vehicle does not answer".into()),
         };
         let numbers: Vec<u16> =
             self.waiting.iter().filter(|(_, (_, since))| late(*since)).map(|(number, _)| *number).collect();
         for number in numbers {
             match self.waiting.remove(&number) {
                 Some((Why::Page(client, asked), _)) => {
-                    let answer = silent(&asked);
-                    tell(Said::Answer(client, asked, answer));
+                    tell(Said::Answer(client, asked, silent()));
                 }
                 // Once more, if it is still wanted.
                 Some((Why::List(index), _)) if now.is_some() => self.next = self.next.min(index),
@@ -395,13 +391,11 @@ impl Station {
             }
         }
         if let Some((Typed { client, asked, .. }, _)) = self.line.take_if(|(_, since)| late(*since)) {
-            let answer = silent(&asked);
-            tell(Said::Answer(client, asked, answer));
+            tell(Said::Answer(client, asked, silent()));
         }
         while self.motor.front().is_some_and(|(_, _, since)| late(*since)) {
             if let Some((client, asked, _)) = self.motor.pop_front() {
-                let answer = silent(&asked);
-                tell(Said::Answer(client, asked, answer));
+                tell(Said::Answer(client, asked, silent()));
             }
         }
         if now.is_none() {

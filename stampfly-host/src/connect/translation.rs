@@ -1,17 +1,26 @@
 //! Between a cable's envelopes and payloads of the secure link: what each has that the other has not.
 //!
-//! An envelope has the number of the question that it asks or answers, and the fingerprint of the tables. On the secure link an acknowledgement names a frame's counter,
-//! a parameter its place, a reply the one line that was typed, and the fingerprint comes by itself once a second. Nothing that depends on the vehicle's tables passes before it
-//! is known, and with other tables than the station's nothing but a kill does. No socket, no clock, no key.
+//! An envelope has the number of the question that it asks or answers, and the fingerprint of the tables. On the secure link an acknowledgement names a command's number or a
+//! frame's counter, a parameter its place, a reply the one line that was typed, and the fingerprint comes by itself once a second. Nothing that depends on the vehicle's tables
+//! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again here until it is answered: commands as
+//! [`Commands`] does it, questions for parameters as they are, and a line from where its answer is missing. No socket, no clock, no key.
 
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
-use stampfly_link::secure::Payload;
+use stampfly_link::secure::{Commands, Outcome, Payload};
 use stampfly_services::cable::{Assembly, Envelope, TYPE};
+use stampfly_types::messages::GuidedKind;
+use stampfly_types::{Duration, Instant};
 use std::collections::VecDeque;
 
 /// Questions whose answers are still to come. The station gives up after a while, and asks fewer in that time.
 const ASKED: usize = 128;
+/// A question is asked again after this long: the vehicle makes two answers every 20 ms, and eight wait.
+const AGAIN: Duration = Duration::from_millis(300);
+/// When a part of an answer is missing: the parts behind it that are on their way come before the one that is asked for.
+const GAP: Duration = Duration::from_millis(60);
+/// For this long. A station that gives up after three seconds has given up on none that may still be answered.
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Who the vehicle is on the station's line: system and component.
 const VEHICLE: [u8; 2] = [1, 1];
 
@@ -28,6 +37,27 @@ enum Tables {
 /// Seals a payload and sends it. Returns the counter of its frame; `None` when it could not be sealed.
 pub(super) type Send<'s> = &'s mut dyn FnMut(&Payload<'_>) -> Option<u32>;
 
+/// A question for a parameter.
+#[derive(Clone, Copy, Debug)]
+struct Question {
+    number: u16,
+    index: u16,
+    /// Reading it, or writing it.
+    payload: Payload<'static>,
+    until: Instant,
+    again_at: Instant,
+}
+
+/// A line that is being answered.
+struct Typed {
+    number: u16,
+    text: String,
+    /// Bytes of the answer that have come.
+    had: u16,
+    until: Instant,
+    again_at: Instant,
+}
+
 /// What is known of both sides.
 pub(super) struct Translation {
     decoder: MavlinkDecoder<MavMessage>,
@@ -36,33 +66,37 @@ pub(super) struct Translation {
     /// Fingerprint of the station's tables.
     ours: u16,
     tables: Tables,
-    /// Numbers of commands by the counters of their frames, of questions by the places of their parameters, of the line and of the newest kill.
-    commands: VecDeque<(u32, u16)>,
-    parameters: VecDeque<(u16, u16)>,
-    line: u16,
-    kill: u16,
+    commands: Commands,
+    /// A command's number is that of the station's question, counted from here: from another one in every run.
+    first: u32,
+    parameters: VecDeque<Question>,
+    /// What a vehicle refuses while it is armed: counters of frames, and numbers of the questions in them.
+    refusable: VecDeque<(u32, u16)>,
+    line: Option<Typed>,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
 }
 
 impl Translation {
-    pub fn new() -> Self {
+    /// Commands have numbers that are counted from `first`, which is random.
+    pub fn new(first: u32) -> Self {
         Self {
             decoder: MavlinkDecoder::new(),
             assembly: Assembly::default(),
             writer: MavlinkWriter::new(VEHICLE[0], VEHICLE[1]),
             ours: 0,
             tables: Tables::Unknown,
-            commands: VecDeque::new(),
+            commands: Commands::new(),
+            first,
             parameters: VecDeque::new(),
-            line: 0,
-            kill: 0,
+            refusable: VecDeque::new(),
+            line: None,
             frames: VecDeque::new(),
         }
     }
 
     /// Takes what the station says on its line.
-    pub fn say(&mut self, bytes: &[u8], send: Send<'_>) {
+    pub fn say(&mut self, now: Instant, bytes: &[u8], send: Send<'_>) {
         for byte in bytes {
             let Some(frame) = self.decoder.feed(*byte) else { continue };
             // MAVLink's own messages are for a cable.
@@ -76,112 +110,238 @@ impl Translation {
                 Tables::Unknown => !matches!(payload, Payload::ReadParameter { .. } | Payload::WriteParameter { .. }),
                 Tables::Others(_) => payload.is_kill(),
             };
-            let Some(counter) = passes.then(|| send(&payload)).flatten() else { continue };
-            if payload.is_kill() {
-                self.kill = number;
+            if !passes {
+                continue;
+            }
+            // What says nothing but that somebody is there is said again anyway.
+            let command = payload.command().filter(|command| command.kind != GuidedKind::None);
+            if let Some(command) = command {
+                if !self.commands.say(now, self.first.wrapping_add(number.into()), command) {
+                    put(&mut self.writer, &mut self.frames, self.ours, number, &refused());
+                }
+                continue;
             }
             match payload {
-                Payload::Guided(_) | Payload::Kill => remember(&mut self.commands, (counter, number)),
-                Payload::ReadParameter { index } | Payload::WriteParameter { index, .. } => {
-                    remember(&mut self.parameters, (index, number));
+                Payload::ReadParameter { index } => self.ask(now, number, index, Payload::ReadParameter { index }),
+                Payload::WriteParameter { index, value } => {
+                    // The newer value is the one that stays.
+                    let is_older = |question: &Question| question.index == index && is_write(&question.payload);
+                    self.parameters
+                        .iter_mut()
+                        .filter(|question| is_older(question))
+                        .for_each(|older| older.again_at = older.until);
+                    self.ask(now, number, index, Payload::WriteParameter { index, value });
                 }
-                Payload::Line(_) => self.line = number,
-                _ => {}
+                Payload::Line(text) => {
+                    let (text, until) = (text.to_owned(), now + PATIENCE);
+                    self.line = Some(Typed { number, text, had: 0, until, again_at: now });
+                }
+                _ => _ = send(&payload),
             }
         }
+        self.poll(now, send);
     }
 
-    /// The newest kill was said again, in the frame with this counter: to acknowledge either is an answer.
-    pub fn kill_again(&mut self, counter: u32) {
-        remember(&mut self.commands, (counter, self.kill));
+    fn ask(&mut self, now: Instant, number: u16, index: u16, payload: Payload<'static>) {
+        remember(&mut self.parameters, Question { number, index, payload, until: now + PATIENCE, again_at: now });
+    }
+
+    /// Says what is due to be said, for the first time or again. Call it every 20 ms.
+    pub fn poll(&mut self, now: Instant, send: Send<'_>) {
+        let Self { commands, first, parameters, refusable, line, writer, frames, .. } = self;
+        if let Some(payload) = commands.next(now) {
+            send(&payload);
+        }
+        while let Some((number, outcome)) = commands.over(now) {
+            // The station knows by itself what is not answered.
+            if outcome == Outcome::NoRoom {
+                put(writer, frames, self.ours, number.wrapping_sub(*first) as u16, &refused());
+            }
+        }
+        parameters.retain(|question| now < question.until);
+        for question in parameters.iter_mut().filter(|question| now >= question.again_at) {
+            question.again_at = now + AGAIN;
+            if let Some(counter) = send(&question.payload).filter(|_| is_write(&question.payload)) {
+                remember(refusable, (counter, question.number));
+            }
+        }
+        line.take_if(|line| now >= line.until);
+        if let Some(line) = line.as_mut().filter(|line| now >= line.again_at) {
+            line.again_at = now + AGAIN;
+            let number = first.wrapping_add(line.number.into());
+            if let Some(counter) = send(&Payload::Question { number, from: line.had, line: &line.text }) {
+                remember(refusable, (counter, line.number));
+            }
+        }
     }
 
     /// Takes what the vehicle says.
-    pub fn hear(&mut self, payload: &Payload<'_>) {
+    pub fn hear(&mut self, now: Instant, payload: &Payload<'_>) {
         if let Payload::Tables { fingerprint } = *payload {
             self.tables = if fingerprint == self.ours { Tables::Ours } else { Tables::Others(fingerprint) };
         }
-        let (table, number) = match (self.tables, payload) {
-            // The station sees the fingerprint, and nothing else.
-            (Tables::Others(table), Payload::Tables { .. }) => (table, 0),
-            (Tables::Ours, Payload::Acknowledgement { counter, taken }) => {
-                let number = take(&mut self.commands, counter);
-                // Of a kill that is said again and again, the vehicle has no room for the last ones because it has the first.
-                if !taken && number == self.kill {
-                    return;
-                }
-                (self.ours, number)
+        let number = match *payload {
+            Payload::Acknowledgement { counter, taken } => match self.acknowledged(counter, taken) {
+                Some(number) => number,
+                None => return,
+            },
+            Payload::Parameter { index, value, taken } => {
+                let is_answered = |question: &Question| question.index == index && is_answer(question, value, taken);
+                let place = self.parameters.iter().position(is_answered);
+                place.and_then(|place| self.parameters.remove(place)).map_or(0, |question| question.number)
             }
-            (Tables::Ours, Payload::Parameter { index, .. }) => (self.ours, take(&mut self.parameters, index)),
-            (Tables::Ours, Payload::Reply { .. }) => (self.ours, self.line),
-            (Tables::Ours, _) => (self.ours, 0),
+            Payload::Part { number, from, text, last } => {
+                let Some(question) = self.part(now, number, from, text, last) else { return };
+                return self.put(question, &Payload::Reply { text, last });
+            }
+            _ => 0,
+        };
+        self.put(number, payload);
+    }
+
+    /// What the station reads, if it knows the vehicle's tables.
+    fn put(&mut self, number: u16, payload: &Payload<'_>) {
+        let table = match (self.tables, payload) {
+            // The station sees the fingerprint, and nothing else.
+            (Tables::Others(table), Payload::Tables { .. }) => table,
+            (Tables::Ours, _) => self.ours,
             _ => return,
         };
-        let Self { writer, frames, .. } = self;
-        Envelope::write(table, number, payload, &mut |part| {
-            let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) else { return };
-            let mut room = [0; LONGEST];
-            let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);
-            frames.extend(frame.unwrap_or_default());
-        });
+        put(&mut self.writer, &mut self.frames, table, number, payload);
+    }
+
+    /// The question that the next part of an answer belongs to. Behind a gap it is none, and is asked for once more.
+    fn part(&mut self, now: Instant, number: u32, from: u16, text: &str, last: bool) -> Option<u16> {
+        let first = self.first;
+        let line = self.line.as_mut().filter(|line| first.wrapping_add(line.number.into()) == number)?;
+        if from != line.had {
+            if from > line.had {
+                line.again_at = line.again_at.min(now + GAP);
+            }
+            return None;
+        }
+        let question = line.number;
+        (line.had, line.until, line.again_at) = (from.saturating_add(text.len() as u16), now + PATIENCE, now + AGAIN);
+        if last {
+            self.line = None;
+        }
+        Some(question)
+    }
+
+    /// The number of the question that is answered with it.
+    fn acknowledged(&mut self, counter: u32, taken: bool) -> Option<u16> {
+        if self.commands.acknowledge(counter, taken) {
+            return Some(counter.wrapping_sub(self.first) as u16);
+        }
+        let place = self.refusable.iter().position(|(refused, _)| *refused == counter && !taken)?;
+        let (_, number) = self.refusable.remove(place)?;
+        self.parameters.retain(|question| question.number != number);
+        self.line.take_if(|line| line.number == number);
+        Some(number)
     }
 }
 
-fn remember<T>(asked: &mut VecDeque<(T, u16)>, question: (T, u16)) {
+const fn refused() -> Payload<'static> {
+    Payload::Acknowledgement { counter: 0, taken: false }
+}
+
+const fn is_write(payload: &Payload<'_>) -> bool {
+    matches!(payload, Payload::WriteParameter { .. })
+}
+
+/// A parameter has this value: is that what became of the question? To a write, an answer to a reading before it is none.
+fn is_answer(question: &Question, value: f32, taken: bool) -> bool {
+    match question.payload {
+        // A time is rounded to whole microseconds.
+        Payload::WriteParameter { value: written, .. } => {
+            !taken || (value - written).abs() <= 1e-6 * written.abs().max(1.0)
+        }
+        _ => true,
+    }
+}
+
+/// Puts an envelope into frames for the station.
+fn put(writer: &mut MavlinkWriter, frames: &mut VecDeque<u8>, table: u16, number: u16, payload: &Payload<'_>) {
+    Envelope::write(table, number, payload, &mut |part| {
+        let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) else { return };
+        let mut room = [0; LONGEST];
+        let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);
+        frames.extend(frame.unwrap_or_default());
+    });
+}
+
+fn remember<T>(asked: &mut VecDeque<T>, question: T) {
     if asked.len() >= ASKED {
         asked.pop_front();
     }
     asked.push_back(question);
 }
 
-/// The number of the oldest question for this. Zero, which no question has, when nobody has asked.
-fn take<T: PartialEq>(asked: &mut VecDeque<(T, u16)>, of: &T) -> u16 {
-    let place = asked.iter().position(|(other, _)| other == of);
-    place.and_then(|place| asked.remove(place)).map_or(0, |(_, number)| number)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use stampfly_link::secure::Sample;
-    use stampfly_types::Instant;
-    use stampfly_types::messages::{GuidedCommand, GuidedKind};
+    use stampfly_types::messages::GuidedCommand;
 
     const OURS: u16 = 7;
+    /// The number before that of the first command: those of the next go on at zero.
+    const FIRST: u32 = u32::MAX - 2;
 
     /// The station's end of the line, a radio that seals everything, and what is between them.
     struct Line {
         translation: Translation,
-        /// What was sent, and the counter of the next frame.
+        now: Instant,
+        /// What was sent, and the counter of the newest frame.
         sent: Vec<String>,
         counter: u32,
     }
 
     impl Line {
         fn new() -> Self {
-            Self { translation: Translation::new(), sent: Vec::new(), counter: 100 }
+            Self { translation: Translation::new(FIRST), now: Instant::ZERO, sent: Vec::new(), counter: 100 }
+        }
+
+        /// To a vehicle with these tables.
+        fn to(table: u16) -> Self {
+            let mut line = Self::new();
+            line.say(1, &Payload::Watch { topic: 3, period: 40 });
+            line.hear(&Payload::Tables { fingerprint: table });
+            line.sent.clear();
+            line
         }
 
         /// The station says this.
         fn say(&mut self, number: u16, payload: &Payload<'_>) {
-            let (mut writer, mut bytes) = (MavlinkWriter::new(245, 190), Vec::new());
-            Envelope::write(OURS, number, payload, &mut |part| {
-                let mut room = [0; LONGEST];
-                let tunnel = Tunnel::new(TYPE, [0; 2], part).expect("it fits");
-                let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);
-                bytes.extend_from_slice(frame.expect("it fits"));
-            });
-            let Self { translation, sent, counter } = self;
-            translation.say(&bytes, &mut |payload| {
+            let (mut writer, mut bytes) = (MavlinkWriter::new(245, 190), VecDeque::new());
+            put(&mut writer, &mut bytes, OURS, number, payload);
+            let Self { translation, now, sent, counter } = self;
+            translation.say(*now, bytes.make_contiguous(), &mut |payload| {
                 sent.push(format!("{payload:?}"));
                 *counter += 1;
                 Some(*counter)
             });
         }
 
+        /// Time passes, and what is said again is sent.
+        fn pass(&mut self, millis: u64) {
+            let Self { translation, now, sent, counter } = self;
+            for _ in 0..millis / 20 {
+                *now += Duration::from_millis(20);
+                translation.poll(*now, &mut |payload| {
+                    sent.push(format!("{payload:?}"));
+                    *counter += 1;
+                    Some(*counter)
+                });
+            }
+        }
+
         /// The vehicle says this: fingerprint, number and payload that the station reads.
         fn hear(&mut self, payload: &Payload<'_>) -> Option<(u16, u16, String)> {
-            self.translation.hear(payload);
+            self.translation.hear(self.now, payload);
+            self.read()
+        }
+
+        fn read(&mut self) -> Option<(u16, u16, String)> {
             let (mut decoder, mut assembly) = (MavlinkDecoder::<MavMessage>::new(), Assembly::default());
             let bytes: Vec<u8> = self.translation.frames.drain(..).collect();
             let mut read = None;
@@ -199,33 +359,35 @@ mod tests {
         Some((OURS, number, format!("{payload:?}")))
     }
 
+    fn guided(kind: GuidedKind) -> Payload<'static> {
+        Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() })
+    }
+
+    const fn acknowledgement(counter: u32, taken: bool) -> Payload<'static> {
+        Payload::Acknowledgement { counter, taken }
+    }
+
     #[test]
     fn every_answer_has_the_number_of_its_question() {
-        let mut line = Line::new();
-        line.say(1, &Payload::Watch { topic: 3, period: 40 });
-        line.hear(&Payload::Tables { fingerprint: OURS });
-        let arm = GuidedCommand { kind: GuidedKind::Arm, ..GuidedCommand::default() };
-        line.say(2, &Payload::Guided(arm));
-        line.say(3, &Payload::Kill);
+        let mut line = Line::to(OURS);
+        line.say(2, &guided(GuidedKind::Arm));
+        line.say(3, &guided(GuidedKind::TakeOff));
         line.say(4, &Payload::ReadParameter { index: 9 });
         line.say(5, &Payload::WriteParameter { index: 8, value: 1.0 });
         line.say(6, &Payload::ReadParameter { index: 9 });
+        // The answer to a reading that was said again.
+        let late = Payload::Parameter { index: 8, value: 0.5, taken: true };
+        assert_eq!(line.hear(&late), read(&late, 0));
         line.say(7, &Payload::Line("status"));
-        let taken = |counter| Payload::Acknowledgement { counter, taken: true };
         let value = |index| Payload::Parameter { index, value: 1.0, taken: true };
-        let reply = |last| Payload::Reply { text: "well", last };
-        // In another order, as on a radio: frames 101 to 107, a watch first.
-        for (answer, number) in [
-            (taken(103), 3),
-            (taken(102), 2),
-            (taken(102), 0),
-            (value(8), 5),
-            (value(9), 4),
-            (value(9), 6),
-            (value(9), 0),
-            (reply(false), 7),
-            (reply(true), 7),
-        ] {
+        // In another order, as on a radio. Commands are acknowledged by their numbers, one after the other.
+        let (arm, take_off) = (acknowledgement(FIRST.wrapping_add(2), true), acknowledgement(0, true));
+        assert_eq!(line.hear(&take_off), None, "it has not been said yet");
+        assert_eq!(line.hear(&arm), read(&arm, 2));
+        assert_eq!(line.hear(&arm), None);
+        line.pass(20);
+        assert_eq!(line.hear(&take_off), read(&take_off, 3));
+        for (answer, number) in [(value(8), 5), (value(9), 4), (value(9), 6), (value(9), 0)] {
             assert_eq!(line.hear(&answer), read(&answer, number));
         }
     }
@@ -244,7 +406,8 @@ mod tests {
         assert_eq!(line.hear(&sample), None);
         line.say(3, &Payload::WriteParameter { index: 8, value: 1.0 });
         line.say(4, &Payload::Line("param reset"));
-        line.say(5, &Payload::Kill);
+        line.say(5, &guided(GuidedKind::Arm));
+        line.say(6, &Payload::Kill);
         assert_eq!(line.sent[1..], ["Kill"]);
 
         // Another vehicle, or another firmware.
@@ -253,27 +416,83 @@ mod tests {
     }
 
     #[test]
-    fn a_kill_that_is_said_again_is_answered_by_either_frame() {
-        let mut line = Line::new();
-        line.say(1, &Payload::Watch { topic: 3, period: 40 });
-        line.hear(&Payload::Tables { fingerprint: OURS });
-        line.say(2, &Payload::Kill);
-        line.translation.kill_again(149);
-        line.translation.kill_again(150);
-        let full = Payload::Acknowledgement { counter: 149, taken: false };
-        assert_eq!(line.hear(&full), None);
-        let taken = Payload::Acknowledgement { counter: 150, taken: true };
-        assert_eq!(line.hear(&taken), read(&taken, 2));
+    fn what_is_not_answered_is_said_again_for_two_seconds_and_what_is_answered_is_not() {
+        let mut line = Line::to(OURS);
+        line.say(2, &guided(GuidedKind::Land));
+        line.say(3, &Payload::ReadParameter { index: 9 });
+        line.say(4, &Payload::WriteParameter { index: 8, value: 1.0 });
+        line.say(5, &Payload::WriteParameter { index: 8, value: 2.0 });
+        line.say(6, &Payload::Line("status"));
+        line.pass(3_000);
+        let sent = |what: &str| line.sent.iter().filter(|sent| sent.contains(what)).count();
+        // Every 60 and every 300 ms; the older of two values is not said again.
+        let counts = ["Land", "ReadParameter", "value: 2.0", "value: 1.0", "status"].map(sent);
+        assert_eq!(counts, [34, 7, 7, 1, 7]);
+
+        line.say(7, &guided(GuidedKind::Land));
+        line.hear(&acknowledgement(FIRST.wrapping_add(7), true));
+        line.say(8, &Payload::ReadParameter { index: 9 });
+        line.hear(&Payload::Parameter { index: 9, value: 1.0, taken: true });
+        line.sent.clear();
+        line.pass(3_000);
+        assert!(line.sent.is_empty(), "{:?}", line.sent);
+    }
+
+    #[test]
+    fn the_station_is_told_that_there_is_no_room_and_what_is_refused_while_armed() {
+        let mut line = Line::to(OURS);
+        let refused = format!("{:?}", refused());
+        line.say(2, &guided(GuidedKind::Hold));
+        assert_eq!(line.hear(&acknowledgement(FIRST.wrapping_add(2), false)), None, "it is said again");
+        line.pass(2_000);
+        assert_eq!(line.read(), Some((OURS, 2, refused.clone())));
+
+        (3..=7).for_each(|number| line.say(number, &guided(GuidedKind::WayPoint)));
+        assert_eq!(line.read(), Some((OURS, 7, refused)));
+
+        line.say(8, &Payload::Line("reboot"));
+        let armed = acknowledgement(line.counter, false);
+        assert_eq!(line.hear(&armed), read(&armed, 8));
+        line.say(9, &Payload::WriteParameter { index: 8, value: 1.0 });
+        let armed = acknowledgement(line.counter, false);
+        assert_eq!(line.hear(&armed), read(&armed, 9));
+        line.sent.clear();
+        line.pass(1_000);
+        assert!(!line.sent.iter().any(|sent| sent.contains("WriteParameter")));
+    }
+
+    #[test]
+    fn a_part_that_is_lost_is_asked_for_and_the_answer_has_no_hole() {
+        let mut line = Line::to(OURS);
+        line.say(8, &Payload::Line("param list"));
+        let part = |from, text, last| Payload::Part { number: FIRST.wrapping_add(8), from, text, last };
+        let reply = |text, last| read(&Payload::Reply { text, last }, 8);
+        assert_eq!(line.hear(&part(0, "a is 1\n", false)), reply("a is 1\n", false));
+        assert_eq!(line.hear(&part(0, "a is 1\n", false)), None);
+        // The next is lost.
+        assert_eq!(line.hear(&part(14, "c is 3\n", false)), None);
+        line.pass(40);
+        assert_eq!(line.hear(&part(21, "d is 4\n", true)), None);
+        line.pass(20);
+        assert_eq!(line.sent.last().map(String::as_str), Some("Question { number: 5, from: 7, line: \"param list\" }"));
+        assert_eq!(line.hear(&part(7, "b is 2\n", false)), reply("b is 2\n", false));
+        // Of another line, which was given up.
+        let other = Payload::Part { number: 4, from: 14, text: "", last: true };
+        assert_eq!(line.hear(&other), None);
+        assert_eq!(line.hear(&part(14, "c is 3\nd is 4\n", true)), reply("c is 3\nd is 4\n", true));
+        line.sent.clear();
+        line.pass(1_000);
+        assert_eq!(line.sent.len(), 0);
     }
 
     #[test]
     fn what_is_never_answered_is_forgotten() {
-        let mut line = Line::new();
-        line.say(1, &Payload::Watch { topic: 3, period: 40 });
-        line.hear(&Payload::Tables { fingerprint: OURS });
+        let mut line = Line::to(OURS);
         (0..1_000).for_each(|number| line.say(number, &Payload::ReadParameter { index: number }));
         assert_eq!(line.translation.parameters.len(), ASKED);
         let newest = Payload::Parameter { index: 999, value: 0.0, taken: true };
         assert_eq!(line.hear(&newest), read(&newest, 999));
+        line.pass(3_000);
+        assert_eq!(line.translation.parameters.len(), 0);
     }
 }

@@ -1,9 +1,8 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
-use crate::connect::{alive, ask, connect, count, is_done, is_up, next, passes, recorded, sample};
+use crate::connect::{alive, ask, connect, is_done, is_up, next, passes, rate, recorded, sample};
 use crate::program::{Program, folder};
 use serde_json::{Value, json};
-use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::ops::Range;
 use std::path::Path;
@@ -33,15 +32,6 @@ fn see(socket: &mut WebSocket<TcpStream>, hello: &Value) -> usize {
     3 + before.map(|field| field["count"].as_u64().expect("a number") as usize).sum::<usize>() + 2
 }
 
-/// Asks until it is done: nobody else says a command again.
-fn insist(socket: &mut WebSocket<TcpStream>, what: &Value) {
-    let until = Instant::now() + SOON;
-    while ask(socket, 8, what.clone())["ok"] != json!(true) {
-        assert!(Instant::now() < until, "{what}");
-        passes(socket, 1);
-    }
-}
-
 /// Waits until its height above the ground, in m, is there. `false` when that takes longer.
 fn is_at(socket: &mut WebSocket<TcpStream>, down: usize, height: Range<f64>, within: Duration) -> bool {
     let until = Instant::now() + within;
@@ -54,22 +44,17 @@ fn is_at(socket: &mut WebSocket<TcpStream>, down: usize, height: Range<f64>, wit
     false
 }
 
-/// Takes off, and returns when it is in the air. Whoever waits for a lost answer is silent meanwhile, so it says both again and again, as people do.
+/// What a page asks once is done, whatever the radio loses.
+fn guided(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) {
+    what["do"] = "guided".into();
+    let answer = ask(socket, id, what);
+    assert_eq!(answer["ok"], json!(true), "{answer}");
+}
+
+/// Takes off, and returns when it is in the air.
 fn fly(socket: &mut WebSocket<TcpStream>, down: usize) {
-    passes(socket, 2);
-    let until = Instant::now() + SOON;
-    while Instant::now() < until {
-        for what in [json!({ "kind": "arm" }), json!({ "kind": "take_off", "height": 0.3 })] {
-            let mut what = what;
-            (what["do"], what["vehicle"], what["id"]) = ("guided".into(), 0.into(), 8.into());
-            socket.send(Message::text(what.to_string())).expect("sent");
-            passes(socket, 1);
-        }
-        if is_at(socket, down, 0.2..0.4, Duration::from_secs(3)) {
-            return;
-        }
-    }
-    panic!("it does not fly");
+    guided(socket, 21, json!({ "kind": "take_off", "height": 0.3 }));
+    assert!(is_at(socket, down, 0.2..0.4, SOON), "it does not fly");
 }
 
 #[test]
@@ -84,11 +69,7 @@ fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
     next(&mut socket, "event", is_up(true));
 
     let down = see(&mut socket, &hello);
-    let (begun, first) = (Instant::now(), count(&mut socket));
-    while begun.elapsed() < Duration::from_secs(3) {
-        count(&mut socket);
-    }
-    let rate = (count(&mut socket) - first) as f64 / begun.elapsed().as_secs_f64();
+    let rate = rate(&mut socket);
     assert!(rate > 8.0, "{rate} Hz");
 
     let set = ask(&mut socket, 2, json!({ "do": "param_set", "name": "eskf.gate", "value": 3.5 }));
@@ -104,14 +85,19 @@ fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
 
     is_done(&mut socket, 7, "status", "blocks   NO_LINK\n");
     passes(&mut socket, 2);
-    insist(&mut socket, &json!({ "do": "guided", "kind": "arm" }));
-    // What is no flying is refused while it is armed, and the page is told when it may be asked.
-    let status = ask(&mut socket, 9, json!({ "do": "console", "line": "status" }));
-    assert!(status["text"].as_str().is_some_and(|text| text.contains("only while it is disarmed")), "{status}");
+    guided(&mut socket, 8, json!({ "kind": "arm" }));
+    // What is no flying is refused while it is armed, and the page is told so at once.
+    let asked = Instant::now();
+    let what =
+        [json!({ "do": "console", "line": "status" }), json!({ "do": "param_set", "name": "eskf.gate", "value": 3.0 })];
+    for (id, what) in (9..).zip(what) {
+        let refused = ask(&mut socket, id, what);
+        assert!(refused["text"].as_str().is_some_and(|text| text.contains("only while it is disarmed")), "{refused}");
+    }
+    assert!(asked.elapsed() < Duration::from_secs(3), "no answer was waited for");
 
     fly(&mut socket, down);
-    let killed = ask(&mut socket, 10, json!({ "do": "guided", "kind": "kill" }));
-    assert_eq!(killed["ok"], json!(true), "{killed}");
+    guided(&mut socket, 10, json!({ "kind": "kill" }));
     // It falls.
     is_done(&mut socket, 11, "status", "CRASHED");
 
@@ -153,23 +139,22 @@ impl Relay {
         let relay = Self { place: near.local_addr().expect("an address"), is_over: Arc::new(AtomicBool::new(false)) };
         let is_over = relay.is_over.clone();
         for socket in [&near, &far] {
-            socket.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
+            socket.set_nonblocking(true).expect("a socket");
         }
         std::thread::spawn(move || {
             let (mut random, mut station, mut room) = (1_u64, None, [0; 512]);
             while !is_over.load(Ordering::Relaxed) {
-                if let Ok((length, from)) = near.recv_from(&mut room) {
+                // All that is there: a relay that is slower than what is said would be a queue.
+                while let Ok((length, from)) = near.recv_from(&mut room) {
                     station = Some(from);
                     pass(&mut random, &mut room[..length], |bytes| drop(far.send(bytes)));
                 }
-                match far.recv(&mut room) {
-                    Ok(length) => pass(&mut random, &mut room[..length], |bytes| {
+                while let Ok(length) = far.recv(&mut room) {
+                    pass(&mut random, &mut room[..length], |bytes| {
                         station.into_iter().for_each(|station| drop(near.send_to(bytes, station)));
-                    }),
-                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-                    // The vehicle is not there.
-                    Err(_) => std::thread::sleep(Duration::from_millis(1)),
+                    });
                 }
+                std::thread::sleep(Duration::from_millis(1));
             }
         });
         relay
@@ -210,12 +195,17 @@ fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
     let hello = next(&mut socket, "hello", |_| true);
     next(&mut socket, "event", is_up(true));
     let down = see(&mut socket, &hello);
-    // By then it is calibrated.
-    passes(&mut socket, 8);
+    is_done(&mut socket, 7, "status", "blocks   NO_LINK\n");
+    passes(&mut socket, 2);
+    // A question for a parameter is asked again, too.
+    let set = ask(&mut socket, 8, json!({ "do": "param_set", "name": "eskf.gate", "value": 3.5 }));
+    assert_eq!((&set["ok"], &set["value"]), (&json!(true), &json!(3.5)));
+    guided(&mut socket, 9, json!({ "kind": "arm" }));
     fly(&mut socket, down);
-    assert_eq!(ask(&mut socket, 10, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(true));
-    // It falls: with somebody there it does not land by itself.
-    assert!(is_at(&mut socket, down, -0.1..0.1, Duration::from_secs(3)));
+    guided(&mut socket, 10, json!({ "kind": "kill" }));
+    // It falls, and is there for its page.
+    assert!(is_at(&mut socket, down, -0.1..0.1, SOON));
+    is_done(&mut socket, 11, "status", "CRASHED");
 }
 
 #[test]

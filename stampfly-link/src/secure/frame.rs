@@ -47,12 +47,16 @@ pub enum Kind {
     Guided = 0x11,
     /// Motors off now.
     Kill = 0x12,
+    /// A program's command, with its number.
+    Numbered = 0x13,
     /// A parameter is asked for.
     ReadParameter = 0x20,
     /// A parameter is to be changed.
     WriteParameter = 0x21,
     /// A line for the console.
     Line = 0x30,
+    /// A line for the console, with its number.
+    Question = 0x31,
     /// Messages of a topic are to be sent.
     Watch = 0x40,
     /// The flight record is to be sent.
@@ -67,6 +71,8 @@ pub enum Kind {
     Parameter = 0xA0,
     /// A part of the console's answer.
     Reply = 0xB0,
+    /// A part of the answer to a question.
+    Part = 0xB1,
     /// A message of a topic.
     Sample = 0xC0,
     /// A chunk of the flight record.
@@ -79,15 +85,17 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 22] = [
         Self::Join,
         Self::Ready,
         Self::Sticks,
         Self::Guided,
         Self::Kill,
+        Self::Numbered,
         Self::ReadParameter,
         Self::WriteParameter,
         Self::Line,
+        Self::Question,
         Self::Watch,
         Self::Record,
         Self::Announcement,
@@ -95,6 +103,7 @@ impl Kind {
         Self::Telemetry,
         Self::Parameter,
         Self::Reply,
+        Self::Part,
         Self::Sample,
         Self::Chunk,
         Self::Tables,

@@ -28,7 +28,7 @@ pub enum Heard<'f> {
     Authentic(Received<'f>),
     /// From anyone.
     Unauthenticated(PilotInput),
-    /// A part of the handshake: nothing for the caller.
+    /// A part of the handshake, or a command that is said again: nothing for the caller.
     Handshake,
 }
 
@@ -205,6 +205,23 @@ impl Guarded {
     ) -> Option<(Address, &'r [u8])> {
         let station = self.station?;
         Some((station, self.vehicle.as_mut()?.seal(now, payload, room).ok()?))
+    }
+
+    /// Notes what became of a command, see [`Vehicle::acknowledge`].
+    pub fn acknowledge(&mut self, received: &Received<'_>, taken: bool) {
+        if let Some(vehicle) = &mut self.vehicle {
+            vehicle.acknowledge(received, taken);
+        }
+    }
+
+    /// Seals what there is to acknowledge, as [`Guarded::seal`] does.
+    pub fn seal_acknowledgement<'r>(
+        &mut self,
+        now: Instant,
+        room: &'r mut [u8; MAX_FRAME],
+    ) -> Option<(Address, &'r [u8])> {
+        let payload = self.vehicle.as_mut()?.acknowledgement()?;
+        self.seal(now, &payload, room)
     }
 
     /// To whom telemetry goes in the clear: the unauthenticated transmitter, while it may fly the vehicle.

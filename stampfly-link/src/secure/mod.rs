@@ -80,6 +80,7 @@ mod budget;
 mod channel;
 mod cipher;
 mod clock;
+mod commands;
 mod frame;
 mod guarded;
 mod key;
@@ -92,6 +93,7 @@ mod vehicle;
 
 pub use budget::Budget;
 pub use clock::MAX_AGE;
+pub use commands::{Commands, Outcome};
 pub use frame::{Kind, MAX_BODY, MAX_FRAME, MIN_FRAME, key_id, put};
 pub use guarded::{Guarded, Heard, NotTaken, Policy};
 pub use key::{Key, KeyError, Uri};

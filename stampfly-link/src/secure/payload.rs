@@ -5,18 +5,21 @@
 //! | 10 sticks | station | roll, pitch, yaw, throttle as 4 × f32 from −1 to 1; u8 flight mode; u8 switches: 0 arm, 1 kill |
 //! | 11 guided | station | u8 what; goal 3 × f32 to ±10 km; f32 heading to ±2π; f32 speed to 100 m/s; f32 dwell to an hour |
 //! | 12 kill | station | nothing |
+//! | 13 numbered | station | u32 number of the command; the command, as in 11 |
 //! | 20 read parameter | station | u16 place in the vehicle's table |
 //! | 21 write parameter | station | u16 place; f32 value, finite |
 //! | 30 line | station | text |
+//! | 31 question | station | u32 number of the line; u16 bytes of its answer that have come; text of the line |
 //! | 40 watch | station | u16 topic; u16 period, ms; 0 ends it |
 //! | 41 record | station | u8 whether the flight record is wanted; said again every second |
 //! | 90 telemetry | vehicle | a [`TelemetryPacket`], with its checksum |
 //! | A0 parameter | vehicle | u16 place; f32 value; u8 whether a write was taken |
 //! | B0 reply | vehicle | u8 whether it is the last; text |
+//! | B1 part | vehicle | u32 number of the line; u16 bytes of its answer before this; u8 whether it is the last; text |
 //! | C0 sample | vehicle | u16 topic; u64 instant, µs; the words of the message, u32 each |
 //! | C1 chunk | vehicle | a chunk of the flight record, with its number and check sum |
 //! | C2 tables | vehicle | u16 fingerprint of its tables of topics and parameters |
-//! | D0 acknowledgement | vehicle | u32 counter of a frame of the station; u8 whether it was taken |
+//! | D0 acknowledgement | vehicle | u32 counter of a frame of the station, of a numbered command its number; u8 whether it was taken |
 //!
 //! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and
 //! subnormal numbers are refused, so that a value has one form; they are sent as zero. Text is UTF-8 without control
@@ -49,6 +52,13 @@ pub enum Payload<'f> {
     Guided(GuidedCommand),
     /// Motors off now, from the station.
     Kill,
+    /// A program's command that is said until it is acknowledged, and taken once, from the station: see [`Commands`](super::Commands).
+    Numbered {
+        /// Another than that of the command before.
+        number: u32,
+        /// The command.
+        command: GuidedCommand,
+    },
     /// The value of a parameter is asked for, from the station.
     ReadParameter {
         /// Place in the vehicle's table.
@@ -63,6 +73,15 @@ pub enum Payload<'f> {
     },
     /// A line for the console, from the station. Not with motors armed.
     Line(&'f str),
+    /// A line for the console that is said until its whole answer has come, in [parts](Self::Part), from the station. Not with motors armed. It is done once.
+    Question {
+        /// Another than that of the line before.
+        number: u32,
+        /// Bytes of the answer that have come: it goes on behind them.
+        from: u16,
+        /// The line.
+        line: &'f str,
+    },
     /// Messages of a topic are to be sent as [samples](Self::Sample), the newest of them, from the station.
     Watch {
         /// Place in the vehicle's topic table.
@@ -93,6 +112,17 @@ pub enum Payload<'f> {
         /// Is it the last?
         last: bool,
     },
+    /// A part of the answer to a [question](Self::Question), from the vehicle.
+    Part {
+        /// The number of the line.
+        number: u32,
+        /// Bytes of the answer before this part.
+        from: u16,
+        /// The part.
+        text: &'f str,
+        /// Is it the last?
+        last: bool,
+    },
     /// A message of one of the vehicle's topics.
     Sample(Sample<'f>),
     /// A chunk of the flight record, from the vehicle.
@@ -104,7 +134,7 @@ pub enum Payload<'f> {
     },
     /// What became of a frame of the station, from the vehicle.
     Acknowledgement {
-        /// The frame's counter.
+        /// The frame's counter; of a [numbered](Self::Numbered) command, its number.
         counter: u32,
         /// Was it taken?
         taken: bool,
@@ -119,14 +149,17 @@ impl<'f> Payload<'f> {
             Self::Sticks(_) => Kind::Sticks,
             Self::Guided(_) => Kind::Guided,
             Self::Kill => Kind::Kill,
+            Self::Numbered { .. } => Kind::Numbered,
             Self::ReadParameter { .. } => Kind::ReadParameter,
             Self::WriteParameter { .. } => Kind::WriteParameter,
             Self::Line(_) => Kind::Line,
+            Self::Question { .. } => Kind::Question,
             Self::Watch { .. } => Kind::Watch,
             Self::Record { .. } => Kind::Record,
             Self::Telemetry(_) => Kind::Telemetry,
             Self::Parameter { .. } => Kind::Parameter,
             Self::Reply { .. } => Kind::Reply,
+            Self::Part { .. } => Kind::Part,
             Self::Sample(_) => Kind::Sample,
             Self::Chunk(_) => Kind::Chunk,
             Self::Tables { .. } => Kind::Tables,
@@ -148,8 +181,18 @@ impl<'f> Payload<'f> {
         match self {
             Self::Kill => true,
             Self::Sticks(input) => input.kill,
-            Self::Guided(command) => matches!(command.kind, GuidedKind::Kill),
+            Self::Guided(command) | Self::Numbered { command, .. } => matches!(command.kind, GuidedKind::Kill),
             _ => false,
+        }
+    }
+
+    /// The command that it is, of a program or to kill.
+    #[must_use]
+    pub fn command(&self) -> Option<GuidedCommand> {
+        match *self {
+            Self::Guided(command) | Self::Numbered { command, .. } => Some(command),
+            Self::Kill => Some(GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() }),
+            _ => None,
         }
     }
 
@@ -165,21 +208,23 @@ impl<'f> Payload<'f> {
                 [roll, pitch, yaw, throttle].into_iter().try_for_each(|stick| to.number(stick, 1.0))?;
                 to.bytes(&[mode as u8, (u8::from(arm) * ARM) | (u8::from(kill) * KILL)])?;
             }
-            Self::Guided(command) => {
-                let GuidedCommand { kind, position, yaw, speed, dwell } = *command;
-                to.bytes(&[kind as u8])?;
-                position.iter().try_for_each(|axis| to.number(*axis, FARTHEST))?;
-                to.number(yaw, TAU)?;
-                to.positive(speed, FASTEST)?;
-                to.positive(dwell, LONGEST)?;
-            }
+            Self::Guided(command) => write(&mut to, command)?,
             Self::Kill => {}
+            Self::Numbered { number, command } => {
+                to.bytes(&number.to_le_bytes())?;
+                write(&mut to, command)?;
+            }
             Self::ReadParameter { index } => to.bytes(&index.to_le_bytes())?,
             Self::WriteParameter { index, value } => {
                 to.bytes(&index.to_le_bytes())?;
                 to.number(*value, f32::MAX)?;
             }
             Self::Line(text) => to.text(text)?,
+            Self::Question { number, from, line } => {
+                to.bytes(&number.to_le_bytes())?;
+                to.bytes(&from.to_le_bytes())?;
+                to.text(line)?;
+            }
             Self::Watch { topic, period } => {
                 to.bytes(&topic.to_le_bytes())?;
                 to.bytes(&period.to_le_bytes())?;
@@ -194,6 +239,12 @@ impl<'f> Payload<'f> {
                 to.truth(*taken)?;
             }
             Self::Reply { text, last } => {
+                to.truth(*last)?;
+                to.text(text)?;
+            }
+            Self::Part { number, from, text, last } => {
+                to.bytes(&number.to_le_bytes())?;
+                to.bytes(&from.to_le_bytes())?;
                 to.truth(*last)?;
                 to.text(text)?;
             }
@@ -225,20 +276,22 @@ impl<'f> Payload<'f> {
                 let (arm, kill) = (switches & ARM != 0, switches & KILL != 0);
                 Self::Sticks(PilotInput { roll, pitch, yaw, throttle, mode, arm, kill })
             }
-            Kind::Guided => {
-                let kind = GuidedKind::from_number(from.byte()?.into())?;
-                let mut axis = || from.number(FARTHEST);
-                let position = Vec3::new(axis()?, axis()?, axis()?);
-                let (yaw, speed, dwell) = (from.number(TAU)?, from.positive(FASTEST)?, from.positive(LONGEST)?);
-                Self::Guided(GuidedCommand { kind, position, yaw, speed, dwell })
-            }
+            Kind::Guided => Self::Guided(read(&mut from)?),
             Kind::Kill => Self::Kill,
+            Kind::Numbered => {
+                let number = u32::from_le_bytes(from.bytes()?);
+                Self::Numbered { number, command: read(&mut from)? }
+            }
             Kind::ReadParameter => Self::ReadParameter { index: u16::from_le_bytes(from.bytes()?) },
             Kind::WriteParameter => {
                 let (index, value) = (u16::from_le_bytes(from.bytes()?), from.number(f32::MAX)?);
                 Self::WriteParameter { index, value }
             }
             Kind::Line => Self::Line(from.text()?),
+            Kind::Question => {
+                let (number, had) = (u32::from_le_bytes(from.bytes()?), u16::from_le_bytes(from.bytes()?));
+                Self::Question { number, from: had, line: from.text()? }
+            }
             Kind::Watch => {
                 let topic = u16::from_le_bytes(from.bytes()?);
                 Self::Watch { topic, period: u16::from_le_bytes(from.bytes()?) }
@@ -255,6 +308,11 @@ impl<'f> Payload<'f> {
                 let last = from.truth()?;
                 Self::Reply { text: from.text()?, last }
             }
+            Kind::Part => {
+                let (number, before) = (u32::from_le_bytes(from.bytes()?), u16::from_le_bytes(from.bytes()?));
+                let last = from.truth()?;
+                Self::Part { number, from: before, text: from.text()?, last }
+            }
             Kind::Sample => {
                 let topic = u16::from_le_bytes(from.bytes()?);
                 let at = Instant::from_micros(u64::from_le_bytes(from.bytes()?));
@@ -270,6 +328,23 @@ impl<'f> Payload<'f> {
         };
         from.end(payload)
     }
+}
+
+fn write(to: &mut Writer<'_>, command: &GuidedCommand) -> Result<(), SealError> {
+    let GuidedCommand { kind, position, yaw, speed, dwell } = *command;
+    to.bytes(&[kind as u8])?;
+    position.iter().try_for_each(|axis| to.number(*axis, FARTHEST))?;
+    to.number(yaw, TAU)?;
+    to.positive(speed, FASTEST)?;
+    to.positive(dwell, LONGEST)
+}
+
+fn read(from: &mut Reader<'_>) -> Option<GuidedCommand> {
+    let kind = GuidedKind::from_number(from.byte()?.into())?;
+    let mut axis = || from.number(FARTHEST);
+    let position = Vec3::new(axis()?, axis()?, axis()?);
+    let (yaw, speed, dwell) = (from.number(TAU)?, from.positive(FASTEST)?, from.positive(LONGEST)?);
+    Some(GuidedCommand { kind, position, yaw, speed, dwell })
 }
 
 /// A message of a topic, as words.

@@ -58,7 +58,7 @@ impl core::error::Error for Refused {}
 pub struct Tally {
     /// Taken, with something in it for the caller.
     pub accepted: u32,
-    /// Taken, as a part of the handshake.
+    /// Taken, with nothing in it for the caller: a part of the handshake, or a command that is said again.
     pub handshakes: u32,
     /// [`Refused::Length`].
     pub length: u32,

@@ -79,6 +79,10 @@ pub struct Vehicle {
     heard: Option<Instant>,
     /// When the newest that was for the caller did.
     taken: Option<Instant>,
+    /// The number of the newest numbered command that was taken.
+    numbered: Option<u32>,
+    /// What is to be acknowledged: counter or number, and whether it was taken.
+    acknowledgement: Option<(u32, bool)>,
     budget: Budget,
     tally: Tally,
 }
@@ -106,6 +110,8 @@ impl Vehicle {
             armed: false,
             heard: None,
             taken: None,
+            numbered: None,
+            acknowledgement: None,
             budget: Budget::new(),
             tally: Tally::default(),
         }
@@ -120,7 +126,7 @@ impl Vehicle {
         self.armed = armed;
     }
 
-    /// Opens a frame in place. `None`: it was a part of the handshake, and there is nothing in it for the caller.
+    /// Opens a frame in place. `None`: it was a part of the handshake, or a command that was taken before, and there is nothing in it for the caller.
     ///
     /// # Errors
     /// When it is not the station's newest word; nothing of it may be used then.
@@ -196,11 +202,21 @@ impl Vehicle {
             if age.ok_or(Refused::Future)? > MAX_AGE {
                 return Err(Refused::Stale);
             }
-            if self.armed && matches!(payload, Payload::WriteParameter { .. } | Payload::Line(_)) {
+            let is_for_the_ground =
+                matches!(payload, Payload::WriteParameter { .. } | Payload::Line(_) | Payload::Question { .. });
+            if self.armed && is_for_the_ground {
+                self.acknowledgement = Some((header.counter, false));
                 return Err(Refused::Armed);
             }
         }
         self.taken = Some(now);
+        if let Payload::Numbered { number, .. } = payload
+            && self.numbered == Some(number)
+        {
+            // The acknowledgement was lost, or is on its way.
+            self.acknowledgement = Some((number, true));
+            return Ok(None);
+        }
         Ok(Some(Received { payload, counter: header.counter, age: age.unwrap_or_default() }))
     }
 
@@ -268,6 +284,24 @@ impl Vehicle {
         let channel = self.current.as_mut().ok_or(SealError::NoSession)?;
         let length = channel.seal(kind, Tick::of(now), room, |place| payload.encode(place))?;
         room.get(..length).ok_or(SealError::Length)
+    }
+
+    /// Notes what became of a command that [`Vehicle::receive`] has returned: whether there was room for it. A
+    /// [numbered](Payload::Numbered) one that was taken is not returned again, however often it is said.
+    pub fn acknowledge(&mut self, received: &Received<'_>, taken: bool) {
+        let counter = match received.payload {
+            Payload::Numbered { number, .. } => {
+                self.numbered = if taken { Some(number) } else { self.numbered };
+                number
+            }
+            _ => received.counter,
+        };
+        self.acknowledgement = Some((counter, taken));
+    }
+
+    /// What the station is to be told of its newest command, or of what was [refused with motors armed](Refused::Armed); once. [Seal](Vehicle::seal) it.
+    pub fn acknowledgement(&mut self) -> Option<Payload<'static>> {
+        self.acknowledgement.take().map(|(counter, taken)| Payload::Acknowledgement { counter, taken })
     }
 
     /// Is there a session, and has its station not been silent?

@@ -1,0 +1,141 @@
+//! Commands that are said until the vehicle acknowledges them: a station's way over a link that loses frames.
+//!
+//! One after the other, in the order they were given. The vehicle takes each once, however often it hears it, so a second way-point is never the first one said
+//! again. A kill goes before all others and ends them. For commands; sticks are newer every time, and to write a parameter twice is to write it once. No
+//! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station), and hand back what is acknowledged.
+
+use super::payload::Payload;
+use stampfly_types::messages::{GuidedCommand, GuidedKind};
+use stampfly_types::{Duration, Instant};
+
+/// Commands that wait, besides a kill.
+const WAITING: usize = 4;
+/// After this long nobody expects a command to be obeyed any more.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Between two frames of a command. An acknowledgement takes a turn of the vehicle's, 20 ms, and twice the way.
+const AGAIN: Duration = Duration::from_millis(60);
+/// Between two frames of a kill.
+const KILL_AGAIN: Duration = Duration::from_millis(20);
+
+/// What became of a command that was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The vehicle had no room for it, as often as it was said.
+    NoRoom,
+    /// No answer came, or a kill came before it. It may have been taken.
+    Silent,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Said {
+    number: u32,
+    command: GuidedCommand,
+    until: Instant,
+    again_at: Instant,
+    outcome: Outcome,
+}
+
+impl Said {
+    const fn is_kill(&self) -> bool {
+        matches!(self.command.kind, GuidedKind::Kill)
+    }
+}
+
+/// Commands on their way to one vehicle.
+///
+/// ```
+/// use stampfly_link::secure::{Commands, Outcome, Payload};
+/// use stampfly_types::{Duration, Instant, messages::{GuidedCommand, GuidedKind}};
+/// let (mut commands, now) = (Commands::new(), Instant::ZERO);
+/// let command = |kind| GuidedCommand { kind, ..GuidedCommand::default() };
+/// assert!(commands.say(now, 41, command(GuidedKind::Arm)) && commands.say(now, 42, command(GuidedKind::TakeOff)));
+///
+/// let arm = Payload::Numbered { number: 41, command: command(GuidedKind::Arm) };
+/// assert_eq!(commands.next(now), Some(arm));
+/// assert_eq!(commands.next(now), None);
+/// let later = now + Duration::from_millis(60);
+/// assert_eq!(commands.next(later), Some(arm), "nothing was heard of it");
+/// assert!(commands.acknowledge(41, true));
+/// assert!(matches!(commands.next(later), Some(Payload::Numbered { number: 42, .. })));
+/// assert_eq!(commands.over(now + Duration::from_secs(2)), Some((42, Outcome::Silent)));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Commands {
+    /// The one that is being said, and those behind it.
+    waiting: [Option<Said>; WAITING + 1],
+    /// Was the frame of a kill before this one without a number?
+    was_plain: bool,
+}
+
+impl Default for Commands {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Commands {
+    /// None.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { waiting: [None; WAITING + 1], was_plain: false }
+    }
+
+    /// Takes a command. `number` is one that no command to this vehicle had lately: count on from a random one, or after a
+    /// restart a vehicle could think that it has taken it. `false` when four wait. For a kill there is always room; a kill takes the place of a kill.
+    pub fn say(&mut self, now: Instant, number: u32, command: GuidedCommand) -> bool {
+        let said = Said { number, command, until: now + PATIENCE, again_at: now, outcome: Outcome::Silent };
+        if !said.is_kill() {
+            let place = self.waiting.iter_mut().take(WAITING).find(|place| place.is_none());
+            return place.map(|place| *place = Some(said)).is_some();
+        }
+        self.waiting.iter_mut().flatten().for_each(|waiting| waiting.until = now);
+        if self.waiting.first().is_some_and(|first| first.is_none_or(|first| !first.is_kill())) {
+            // Its last place is free: commands leave it so.
+            self.waiting.rotate_right(1);
+        }
+        self.waiting.first_mut().into_iter().for_each(|first| *first = Some(said));
+        self.was_plain = false;
+        true
+    }
+
+    /// What is to be sealed and sent now. Ask every 20 ms or so.
+    pub fn next(&mut self, now: Instant) -> Option<Payload<'static>> {
+        let said = self.waiting.first_mut()?.as_mut().filter(|said| now >= said.again_at && now < said.until)?;
+        let numbered = Payload::Numbered { number: said.number, command: said.command };
+        if !said.is_kill() {
+            said.again_at = now + AGAIN;
+            return Some(numbered);
+        }
+        said.again_at = now + KILL_AGAIN;
+        // By turns: a flood does not keep this kind from being heard, and the other is acknowledged by its number.
+        self.was_plain = !self.was_plain;
+        Some(if self.was_plain { Payload::Kill } else { numbered })
+    }
+
+    /// Takes an [acknowledgement](Payload::Acknowledgement). Was the command with this number taken, and is that news?
+    pub fn acknowledge(&mut self, number: u32, taken: bool) -> bool {
+        let Some(said) = self.waiting.first_mut().and_then(Option::as_mut) else { return false };
+        if said.number != number {
+            return false;
+        }
+        said.outcome = Outcome::NoRoom;
+        if taken {
+            self.remove(0);
+        }
+        taken
+    }
+
+    /// A command that was not taken in two seconds, and what became of it. Ask until there is none.
+    pub fn over(&mut self, now: Instant) -> Option<(u32, Outcome)> {
+        let is_over = |said: &Option<Said>| said.is_some_and(|said| now >= said.until);
+        let place = self.waiting.iter().position(is_over)?;
+        self.remove(place).map(|said| (said.number, said.outcome))
+    }
+
+    fn remove(&mut self, place: usize) -> Option<Said> {
+        let rest = self.waiting.get_mut(place..)?;
+        let removed = rest.first_mut()?.take();
+        rest.rotate_left(1);
+        removed
+    }
+}
