@@ -76,6 +76,46 @@ pub struct Answer<'r, R> {
 
 /// A payload that waits to be sent: on a radio, sealing and sending are one, so that no frame overtakes another.
 #[derive(Clone, Debug, PartialEq)]
+pub struct Post(Copied);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Copied {
+    Parameter { index: u16, value: f32, taken: bool },
+    Reply { text: String<PIECE>, last: bool },
+    Part { number: u32, from: u16, text: String<PIECE>, last: bool },
+}
+
+impl Post {
+    /// A copy of what a desk has answered. `None` of anything else.
+    #[must_use]
+    pub fn of(payload: &Payload<'_>) -> Option<Self> {
+        let copy = |text| String::try_from(text).ok();
+        Some(Self(match *payload {
+            Payload::Parameter { index, value, taken } => Copied::Parameter { index, value, taken },
+            Payload::Reply { text, last } => Copied::Reply { text: copy(text)?, last },
+            Payload::Part { number, from, text, last } => Copied::Part { number, from, text: copy(text)?, last },
+            _ => return None,
+        }))
+    }
+
+    /// What is to be sent.
+    #[must_use]
+    pub fn payload(&self) -> Payload<'_> {
+        match &self.0 {
+            Copied::Parameter { index, value, taken } => {
+                Payload::Parameter { index: *index, value: *value, taken: *taken }
+            }
+            Copied::Reply { text, last } => Payload::Reply { text, last: *last },
+            Copied::Part { number, from, text, last } => {
+                Payload::Part { number: *number, from: *from, text, last: *last }
+            }
+        }
+    }
+}
+
+/// What [`Post`] was before questions had numbers.
+#[deprecated(since = "0.2.1", note = "use `Post`, which has parts of answers, too")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Letter {
     /// A parameter.
     Parameter {
@@ -88,30 +128,17 @@ pub enum Letter {
     },
     /// A reply's part, and whether it is the last.
     Reply(String<PIECE>, bool),
-    /// The same for a question with a number.
-    Part {
-        /// The number of the line.
-        number: u32,
-        /// Bytes of the reply before it.
-        from: u16,
-        /// The part.
-        text: String<PIECE>,
-        /// Is it the last?
-        last: bool,
-    },
 }
 
+#[allow(deprecated, reason = "of the deprecated type itself")]
 impl Letter {
     /// A copy of what a desk has answered. `None` of anything else.
     #[must_use]
     pub fn of(payload: &Payload<'_>) -> Option<Self> {
-        match *payload {
-            Payload::Parameter { index, value, taken } => Some(Self::Parameter { index, value, taken }),
-            Payload::Reply { text, last } => Some(Self::Reply(String::try_from(text).ok()?, last)),
-            Payload::Part { number, from, text, last } => {
-                Some(Self::Part { number, from, text: String::try_from(text).ok()?, last })
-            }
-            _ => None,
+        match Post::of(payload)?.0 {
+            Copied::Parameter { index, value, taken } => Some(Self::Parameter { index, value, taken }),
+            Copied::Reply { text, last } => Some(Self::Reply(text, last)),
+            Copied::Part { .. } => None,
         }
     }
 
@@ -123,9 +150,6 @@ impl Letter {
                 Payload::Parameter { index: *index, value: *value, taken: *taken }
             }
             Self::Reply(text, last) => Payload::Reply { text, last: *last },
-            Self::Part { number, from, text, last } => {
-                Payload::Part { number: *number, from: *from, text, last: *last }
-            }
         }
     }
 }

@@ -4,6 +4,7 @@
 //! station that is gone leaves it to the next. As long as nobody asks, nothing is recorded. Not for a log of samples: a station watches topics for that.
 
 use stampfly_flight::compact::Chunks;
+use stampfly_link::secure::MAX_BODY;
 use stampfly_types::{Duration, Instant};
 
 /// A station that has not asked again for this long is gone.
@@ -11,6 +12,9 @@ const SILENCE: Duration = Duration::from_secs(5);
 
 /// Chunks in a turn of a radio of 20 ms, a frame each: 40 kB a second, where a flight has 28. What the air does not take finds no room in the ring, and is counted there.
 pub const RADIO_CHUNKS: usize = 4;
+
+/// A chunk of at least this length is sent by a radio: its packet is nearly full.
+pub const RADIO_CHUNK: usize = MAX_BODY - 32;
 
 /// Who has the record. `T` tells the lines of a vehicle apart.
 ///

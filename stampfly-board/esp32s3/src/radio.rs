@@ -34,9 +34,9 @@ use stampfly_board::topics;
 use stampfly_drivers::Timebase;
 use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
-use stampfly_services::desk::Letter;
+use stampfly_services::desk::Post;
 use stampfly_services::radio_desk::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioDesk, Words};
-use stampfly_services::tape::RADIO_CHUNKS;
+use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
 use static_cell::StaticCell;
 
 /// A key that was made and is to be stored.
@@ -58,10 +58,8 @@ pub struct Parts {
 }
 
 /// Answers of the desk, which the console's task makes: sealed right before they are sent, so that no frame overtakes another.
-pub static LETTERS: Channel<CriticalSectionRawMutex, Letter, LETTERS_AT_ONCE> = Channel::new();
+pub static LETTERS: Channel<CriticalSectionRawMutex, Post, LETTERS_AT_ONCE> = Channel::new();
 const LETTERS_AT_ONCE: usize = 2;
-/// A packet that is nearly full.
-const LEAST_CHUNK: usize = MAX_BODY - 32;
 
 /// A link of a vehicle with this transmitter and key, as far as it has them.
 pub fn link(
@@ -191,7 +189,7 @@ async fn send(mut say: Say<'_>, random: &Trng, link: &RefCell<Link<'_>>, waiting
         for _ in 0..RADIO_CHUNKS {
             let sealed = {
                 let (mut taken, mut chunk) = (waiting.taken.borrow_mut(), [0; MAX_BODY]);
-                let Some(chunk) = taken.chunk(Line::Radio, &mut chunk, LEAST_CHUNK) else { break };
+                let Some(chunk) = taken.chunk(Line::Radio, &mut chunk, RADIO_CHUNK) else { break };
                 link.borrow_mut().guarded.seal(Clock.now(), &Payload::Chunk(chunk), &mut room)
             };
             if let Some((to, bytes)) = sealed {

@@ -14,7 +14,7 @@ use stampfly_link::secure::{
     Guarded, Key, KeyError, MAX_BODY, MAX_FRAME, NotTaken, Payload, Policy, Refused, Station, Tally, Vehicle,
 };
 use stampfly_link::{Address, ControlPacket, Session};
-use stampfly_services::tape::RADIO_CHUNKS;
+use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
 use stampfly_services::{Desk, Tape};
 use stampfly_sim::Noise;
 use stampfly_sim::time::Clock;
@@ -34,8 +34,6 @@ const TICK: u64 = 2_500;
 /// of 240 MHz each, and a few comparisons; neither has been measured on the chip.
 const OPENING: Duration = Duration::from_micros(112);
 const LOOK: Duration = Duration::from_micros(5);
-/// A packet that is nearly full.
-pub(super) const LEAST_CHUNK: usize = MAX_BODY - 32;
 /// Between two questions for the flight record.
 const ASKS: Duration = Duration::from_secs(1);
 
@@ -150,7 +148,7 @@ impl<'b> Ends<'b> {
         self.tape.poll(now, chunks);
         for _ in 0..RADIO_CHUNKS {
             let (mut body, mut room) = ([0; MAX_BODY], [0; MAX_FRAME]);
-            let Some(chunk) = self.tape.chunk((), chunks, &mut body, LEAST_CHUNK) else { break };
+            let Some(chunk) = self.tape.chunk((), chunks, &mut body, RADIO_CHUNK) else { break };
             // Without a session it is gone, as on the air.
             let Some((_, frame)) = self.link.guarded.seal(now, &Payload::Chunk(chunk), &mut room) else { continue };
             let mut frame = frame.to_vec();

@@ -10,7 +10,7 @@ use stampfly_flight::console::Request;
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, NotTaken, Payload, Refused, Station, Vehicle};
 use stampfly_services::association::NAMES;
-use stampfly_services::desk::{Desk, Letter, Room};
+use stampfly_services::desk::{Desk, Post, Room};
 use stampfly_services::network::Reserved;
 use stampfly_types::Message;
 use stampfly_types::messages::FlightStatus;
@@ -82,7 +82,7 @@ impl<'b> Air<'b> {
             Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, facts: &[], config };
         let mut room = Room::default();
         let Some(answer) = self.desk.answer(self.bench.now, &mut vehicle, &mut room) else { return };
-        let letter = Letter::of(&answer.payload).expect("an answer");
+        let letter = Post::of(&answer.payload).expect("an answer");
         if answer.request != Request::Nothing {
             self.requests.push(answer.request);
             self.desk.report(&"done");

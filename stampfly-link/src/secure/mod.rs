@@ -63,6 +63,16 @@
 //! counting from there, and its frames say when they were sealed. The estimate is never ahead of the vehicle's clock, so no
 //! frame passes for younger than it is. A kill is used whatever its age.
 //!
+//! # What is lost
+//!
+//! | what | then |
+//! |---|---|
+//! | sticks, samples, telemetry | the next is newer |
+//! | a command | [`Commands`] says it until it is acknowledged; the vehicle takes it once, by its number, in whichever session it hears it |
+//! | a parameter | ask again: to write it twice is to write it once |
+//! | a line, or a part of its answer | ask again with a [question](Payload::Question) of the same number, from where the answer is missing |
+//! | what is refused with motors armed | the vehicle acknowledges it as refused |
+//!
 //! # Floods
 //!
 //! In a tick of 2.5 ms, at most eight frames are worked on that turn out to be bad, the last two of them only if they say that

@@ -12,7 +12,7 @@ use stampfly_board::parameters;
 use stampfly_drivers::Timebase;
 use stampfly_flight::console::Request;
 use stampfly_services::cable::{BODY, PART, TUNNEL};
-use stampfly_services::desk::{Letter, Room};
+use stampfly_services::desk::{Post, Room};
 
 /// Bytes of the frames of a chunk of the flight record.
 const CHUNK: usize = BODY.div_ceil(PART) * (TUNNEL + 32);
@@ -78,7 +78,7 @@ impl Console {
             let answered = known.vehicle(config, |vehicle| {
                 let mut room = Room::default();
                 let answer = desk.borrow_mut().questions.answer(now, vehicle, &mut room)?;
-                Some((Letter::of(&answer.payload), answer.request))
+                Some((Post::of(&answer.payload), answer.request))
             });
             if let Some((letter, request)) = answered {
                 if let Some(letter) = letter {

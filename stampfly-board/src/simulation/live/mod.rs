@@ -27,7 +27,6 @@ pub(super) use services::Services;
 
 use crate::VehicleConfig;
 use crate::console::Newest;
-use crate::simulation::air::LEAST_CHUNK;
 use crate::simulation::faults::FAULTS;
 use crate::topics::{Id, TOPICS};
 use stampfly_drivers::chip::pmw3901;
@@ -36,6 +35,7 @@ use stampfly_flight::live::Change;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::MAX_BODY;
 use stampfly_services::cable::BODY;
+use stampfly_services::tape::RADIO_CHUNK;
 use stampfly_services::{DataStream, Places, Tape, Telemetry, View, version};
 use stampfly_sim::ground::About;
 use stampfly_sim::vehicle::{Client, PortSpec, Transport};
@@ -128,7 +128,7 @@ impl Seen {
         let (mut tape, mut waiting) = (self.tape.borrow_mut(), self.chunks.borrow_mut());
         tape.poll(now, chunks);
         let Some(line) = tape.line() else { return waiting.clear() };
-        let (longest, least) = if line.port == SEALED { (MAX_BODY, LEAST_CHUNK) } else { (BODY, LEAST) };
+        let (longest, least) = if line.port == SEALED { (MAX_BODY, RADIO_CHUNK) } else { (BODY, LEAST) };
         let mut room = [0; BODY];
         let Some(room) = room.get_mut(..longest) else { return };
         while waiting.len() < WAITING
