@@ -16,6 +16,8 @@ struct Scene {
     /// Random numbers: no two are the same.
     random: u64,
     armed: bool,
+    /// The number of the newest command that was taken.
+    taken: Option<u32>,
 }
 
 /// What happens: events, each with a time step. The first byte says what the vehicle accepts.
@@ -27,7 +29,7 @@ pub fn secure_session(data: &[u8]) {
     let vehicle = Guarded::new(Vehicle::new(key.clone()), session, policy);
     let station = Station::new(key.clone());
     let now = Instant::ZERO;
-    let mut scene = Scene { key, vehicle, station, now, air: Vec::new(), random: 0, armed: false };
+    let mut scene = Scene { key, vehicle, station, now, air: Vec::new(), random: 0, armed: false, taken: None };
     while !input.is_empty() {
         let (event, step) = (input.byte(), input.byte());
         scene.now += Duration::from_micros(u64::from(step) * 2_500);
@@ -131,14 +133,30 @@ impl Scene {
         match self.vehicle.receive(self.now, Address([2; 6]), &mut frame) {
             Ok(Heard::Authentic(received)) => {
                 check(&Some(received.payload), changed);
-                let changes = matches!(received.payload, Payload::WriteParameter { .. } | Payload::Line(_) | Payload::Question { .. });
+                let changes = match received.payload {
+                    Payload::WriteParameter { .. } | Payload::Line(_) | Payload::Question { .. } => true,
+                    Payload::Numbered { number, .. } => {
+                        assert_ne!(self.taken, Some(number), "a command is taken once");
+                        // A vehicle has no room for some.
+                        if number.is_multiple_of(2) {
+                            self.taken = Some(number);
+                        }
+                        self.vehicle.acknowledge(&received, number.is_multiple_of(2));
+                        false
+                    }
+                    _ => false,
+                };
                 assert!(!self.armed || !changes, "an armed vehicle takes no such thing");
                 assert!(received.age <= stampfly_link::secure::MAX_AGE || received.payload.is_kill());
                 assert_eq!(self.vehicle.age(self.now), Some(Duration::ZERO));
                 let old = self.vehicle.vehicle_mut().expect("it has a key").receive(self.now, &mut again);
                 assert_eq!(old, Err(Refused::Old), "once and never again");
             }
-            Ok(Heard::Handshake) => assert!(!changed && self.vehicle.age(self.now) == age),
+            Ok(Heard::Handshake) => {
+                // A command that is said again is a sign of life.
+                let again = self.taken.is_some() && self.vehicle.age(self.now) == Some(Duration::ZERO);
+                assert!(!changed && (again || self.vehicle.age(self.now) == age));
+            }
             Ok(Heard::Unauthenticated(_)) => assert!(frame.len() < stampfly_link::secure::MIN_FRAME),
             Err(_) => {
                 assert_eq!(self.vehicle.age(self.now), age, "no sign of life");

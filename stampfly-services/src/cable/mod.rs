@@ -124,7 +124,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         }
         let command = match payload {
             Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return cockpit.alive(now, seat),
-            Payload::Guided(command) => command,
+            Payload::Guided(command) | Payload::Numbered { command, .. } => command,
             Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
             // They come again and again, and are not answered.
             Payload::Sticks(input) => {
