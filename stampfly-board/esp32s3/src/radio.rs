@@ -58,8 +58,8 @@ pub struct Parts {
 }
 
 /// Answers of the desk, which the console's task makes: sealed right before they are sent, so that no frame overtakes another.
-pub static LETTERS: Channel<CriticalSectionRawMutex, Post, LETTERS_AT_ONCE> = Channel::new();
-const LETTERS_AT_ONCE: usize = 2;
+pub static POST: Channel<CriticalSectionRawMutex, Post, POST_AT_ONCE> = Channel::new();
+const POST_AT_ONCE: usize = 2;
 
 /// A link of a vehicle with this transmitter and key, as far as it has them.
 pub fn link(
@@ -174,9 +174,9 @@ async fn send(mut say: Say<'_>, random: &Trng, link: &RefCell<Link<'_>>, waiting
                 let _ = say.say(to, bytes).await;
             }
         }
-        for _ in 0..LETTERS_AT_ONCE {
-            let Ok(letter) = LETTERS.try_receive() else { break };
-            let sealed = link.borrow_mut().guarded.seal(Clock.now(), &letter.payload(), &mut room);
+        for _ in 0..POST_AT_ONCE {
+            let Ok(post) = POST.try_receive() else { break };
+            let sealed = link.borrow_mut().guarded.seal(Clock.now(), &post.payload(), &mut room);
             if let Some((to, bytes)) = sealed {
                 let _ = say.say(to, bytes).await;
             }

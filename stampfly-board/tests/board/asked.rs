@@ -82,13 +82,13 @@ impl<'b> Air<'b> {
             Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, facts: &[], config };
         let mut room = Room::default();
         let Some(answer) = self.desk.answer(self.bench.now, &mut vehicle, &mut room) else { return };
-        let letter = Post::of(&answer.payload).expect("an answer");
+        let post = Post::of(&answer.payload).expect("an answer");
         if answer.request != Request::Nothing {
             self.requests.push(answer.request);
             self.desk.report(&"done");
         }
         let mut frame = [0; MAX_FRAME];
-        let sealed = self.bench.link.guarded.seal(self.bench.now, &letter.payload(), &mut frame);
+        let sealed = self.bench.link.guarded.seal(self.bench.now, &post.payload(), &mut frame);
         let (to, mut bytes) = sealed.map(|(to, bytes)| (to, bytes.to_vec())).expect("there is a session");
         assert_eq!(to, STATION);
         self.hear(&mut bytes);

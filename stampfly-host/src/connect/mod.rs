@@ -6,6 +6,7 @@
 //! | [`RadioPlace`] | where a vehicle in a network is, and the sealed frames that go there |
 //! | `way.rs` | one or the other |
 //! | `translation.rs` | what a cable says and what those frames say |
+//! | `questions.rs` | parameters and lines, asked until they are answered |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
 //! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
 //!
@@ -13,6 +14,7 @@
 
 mod log;
 mod place;
+mod questions;
 mod record;
 mod sealed;
 pub mod station;

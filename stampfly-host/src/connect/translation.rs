@@ -1,28 +1,23 @@
 //! Between a cable's envelopes and payloads of the secure link: what each has that the other has not.
 //!
 //! An envelope has the number of the question that it asks or answers, and the fingerprint of the tables. On the secure link an acknowledgement names a command's number or a
-//! frame's counter, a parameter its place, a reply the one line that was typed, and the fingerprint comes by itself once a second. Nothing that depends on the vehicle's tables
-//! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again here until it is answered: commands as
-//! [`Commands`] does it, questions for parameters as they are, and a line from where its answer is missing. No socket, no clock, no key.
+//! frame's counter, a parameter its place, a part of an answer its line, and the fingerprint comes by itself once a second. Nothing that depends on the vehicle's tables
+//! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again until it is answered, by [`Commands`] and
+//! [`Questions`]. No socket, no clock, no key.
 
+use super::questions::{Questions, Send};
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
 use stampfly_link::secure::{Commands, Outcome, Payload};
 use stampfly_services::cable::{Assembly, Envelope, TYPE};
+use stampfly_types::Instant;
 use stampfly_types::messages::GuidedKind;
-use stampfly_types::{Duration, Instant};
 use std::collections::VecDeque;
 
-/// Questions whose answers are still to come. The station gives up after a while, and asks fewer in that time.
-const ASKED: usize = 128;
-/// A question is asked again after this long: the vehicle makes two answers every 20 ms, and eight wait.
-const AGAIN: Duration = Duration::from_millis(300);
-/// When a part of an answer is missing: the parts behind it that are on their way come before the one that is asked for.
-const GAP: Duration = Duration::from_millis(60);
-/// For this long. A station that gives up after three seconds has given up on none that may still be answered.
-const PATIENCE: Duration = Duration::from_secs(2);
 /// Who the vehicle is on the station's line: system and component.
 const VEHICLE: [u8; 2] = [1, 1];
+/// A command was not taken.
+const REFUSED: Payload<'static> = Payload::Acknowledgement { counter: 0, taken: false };
 
 /// What of the vehicle's tables is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,30 +29,6 @@ enum Tables {
     Others(u16),
 }
 
-/// Seals a payload and sends it. Returns the counter of its frame; `None` when it could not be sealed.
-pub(super) type Send<'s> = &'s mut dyn FnMut(&Payload<'_>) -> Option<u32>;
-
-/// A question for a parameter.
-#[derive(Clone, Copy, Debug)]
-struct Question {
-    number: u16,
-    index: u16,
-    /// Reading it, or writing it.
-    payload: Payload<'static>,
-    until: Instant,
-    again_at: Instant,
-}
-
-/// A line that is being answered.
-struct Typed {
-    number: u16,
-    text: String,
-    /// Bytes of the answer that have come.
-    had: u16,
-    until: Instant,
-    again_at: Instant,
-}
-
 /// What is known of both sides.
 pub(super) struct Translation {
     decoder: MavlinkDecoder<MavMessage>,
@@ -66,19 +37,16 @@ pub(super) struct Translation {
     /// Fingerprint of the station's tables.
     ours: u16,
     tables: Tables,
-    commands: Commands,
-    /// A command's number is that of the station's question, counted from here: from another one in every run.
+    /// A command's number is that of the station's question, counted from here.
     first: u32,
-    parameters: VecDeque<Question>,
-    /// What a vehicle refuses while it is armed: counters of frames, and numbers of the questions in them.
-    refusable: VecDeque<(u32, u16)>,
-    line: Option<Typed>,
+    commands: Commands,
+    questions: Questions,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
 }
 
 impl Translation {
-    /// Commands have numbers that are counted from `first`, which is random.
+    /// Commands and lines have numbers that are counted from `first`, which is random: the vehicle remembers the last one of the run before.
     pub fn new(first: u32) -> Self {
         Self {
             decoder: MavlinkDecoder::new(),
@@ -86,11 +54,9 @@ impl Translation {
             writer: MavlinkWriter::new(VEHICLE[0], VEHICLE[1]),
             ours: 0,
             tables: Tables::Unknown,
-            commands: Commands::new(),
             first,
-            parameters: VecDeque::new(),
-            refusable: VecDeque::new(),
-            line: None,
+            commands: Commands::new(),
+            questions: Questions::new(first),
             frames: VecDeque::new(),
         }
     }
@@ -113,66 +79,31 @@ impl Translation {
             if !passes {
                 continue;
             }
-            // What says nothing but that somebody is there is said again anyway.
-            let command = payload.command().filter(|command| command.kind != GuidedKind::None);
-            if let Some(command) = command {
+            // What says nothing but that somebody is there comes again anyway.
+            if let Some(command) = payload.command().filter(|command| command.kind != GuidedKind::None) {
                 if !self.commands.say(now, self.first.wrapping_add(number.into()), command) {
-                    put(&mut self.writer, &mut self.frames, self.ours, number, &refused());
+                    put(&mut self.writer, &mut self.frames, table, number, &REFUSED);
                 }
-                continue;
-            }
-            match payload {
-                Payload::ReadParameter { index } => self.ask(now, number, index, Payload::ReadParameter { index }),
-                Payload::WriteParameter { index, value } => {
-                    // The newer value is the one that stays.
-                    let is_older = |question: &Question| question.index == index && is_write(&question.payload);
-                    self.parameters
-                        .iter_mut()
-                        .filter(|question| is_older(question))
-                        .for_each(|older| older.again_at = older.until);
-                    self.ask(now, number, index, Payload::WriteParameter { index, value });
-                }
-                Payload::Line(text) => {
-                    let (text, until) = (text.to_owned(), now + PATIENCE);
-                    self.line = Some(Typed { number, text, had: 0, until, again_at: now });
-                }
-                _ => _ = send(&payload),
+            } else if !self.questions.ask(now, number, &payload) {
+                send(&payload);
             }
         }
         self.poll(now, send);
     }
 
-    fn ask(&mut self, now: Instant, number: u16, index: u16, payload: Payload<'static>) {
-        remember(&mut self.parameters, Question { number, index, payload, until: now + PATIENCE, again_at: now });
-    }
-
     /// Says what is due to be said, for the first time or again. Call it every 20 ms.
     pub fn poll(&mut self, now: Instant, send: Send<'_>) {
-        let Self { commands, first, parameters, refusable, line, writer, frames, .. } = self;
-        if let Some(payload) = commands.next(now) {
+        if let Some(payload) = self.commands.next(now) {
             send(&payload);
         }
-        while let Some((number, outcome)) = commands.over(now) {
+        while let Some((number, outcome)) = self.commands.over(now) {
             // The station knows by itself what is not answered.
             if outcome == Outcome::NoRoom {
-                put(writer, frames, self.ours, number.wrapping_sub(*first) as u16, &refused());
+                let number = number.wrapping_sub(self.first) as u16;
+                put(&mut self.writer, &mut self.frames, self.ours, number, &REFUSED);
             }
         }
-        parameters.retain(|question| now < question.until);
-        for question in parameters.iter_mut().filter(|question| now >= question.again_at) {
-            question.again_at = now + AGAIN;
-            if let Some(counter) = send(&question.payload).filter(|_| is_write(&question.payload)) {
-                remember(refusable, (counter, question.number));
-            }
-        }
-        line.take_if(|line| now >= line.until);
-        if let Some(line) = line.as_mut().filter(|line| now >= line.again_at) {
-            line.again_at = now + AGAIN;
-            let number = first.wrapping_add(line.number.into());
-            if let Some(counter) = send(&Payload::Question { number, from: line.had, line: &line.text }) {
-                remember(refusable, (counter, line.number));
-            }
-        }
+        self.questions.poll(now, send);
     }
 
     /// Takes what the vehicle says.
@@ -180,83 +111,29 @@ impl Translation {
         if let Payload::Tables { fingerprint } = *payload {
             self.tables = if fingerprint == self.ours { Tables::Ours } else { Tables::Others(fingerprint) };
         }
-        let number = match *payload {
-            Payload::Acknowledgement { counter, taken } => match self.acknowledged(counter, taken) {
-                Some(number) => number,
-                None => return,
-            },
+        let (number, payload) = match *payload {
+            Payload::Acknowledgement { counter, taken } => {
+                let is_done = self.commands.acknowledge(counter, taken);
+                let done = is_done.then(|| counter.wrapping_sub(self.first) as u16);
+                (done.or_else(|| if taken { None } else { self.questions.refused(counter) }), *payload)
+            }
             Payload::Parameter { index, value, taken } => {
-                let is_answered = |question: &Question| question.index == index && is_answer(question, value, taken);
-                let place = self.parameters.iter().position(is_answered);
-                place.and_then(|place| self.parameters.remove(place)).map_or(0, |question| question.number)
+                (Some(self.questions.parameter(index, value, taken)), *payload)
             }
             Payload::Part { number, from, text, last } => {
-                let Some(question) = self.part(now, number, from, text, last) else { return };
-                return self.put(question, &Payload::Reply { text, last });
+                (self.questions.part(now, number, from, text, last), Payload::Reply { text, last })
             }
-            _ => 0,
+            _ => (Some(0), *payload),
         };
-        self.put(number, payload);
-    }
-
-    /// What the station reads, if it knows the vehicle's tables.
-    fn put(&mut self, number: u16, payload: &Payload<'_>) {
         let table = match (self.tables, payload) {
             // The station sees the fingerprint, and nothing else.
             (Tables::Others(table), Payload::Tables { .. }) => table,
             (Tables::Ours, _) => self.ours,
             _ => return,
         };
-        put(&mut self.writer, &mut self.frames, table, number, payload);
-    }
-
-    /// The question that the next part of an answer belongs to. Behind a gap it is none, and is asked for once more.
-    fn part(&mut self, now: Instant, number: u32, from: u16, text: &str, last: bool) -> Option<u16> {
-        let first = self.first;
-        let line = self.line.as_mut().filter(|line| first.wrapping_add(line.number.into()) == number)?;
-        if from != line.had {
-            if from > line.had {
-                line.again_at = line.again_at.min(now + GAP);
-            }
-            return None;
+        if let Some(number) = number {
+            put(&mut self.writer, &mut self.frames, table, number, &payload);
         }
-        let question = line.number;
-        (line.had, line.until, line.again_at) = (from.saturating_add(text.len() as u16), now + PATIENCE, now + AGAIN);
-        if last {
-            self.line = None;
-        }
-        Some(question)
-    }
-
-    /// The number of the question that is answered with it.
-    fn acknowledged(&mut self, counter: u32, taken: bool) -> Option<u16> {
-        if self.commands.acknowledge(counter, taken) {
-            return Some(counter.wrapping_sub(self.first) as u16);
-        }
-        let place = self.refusable.iter().position(|(refused, _)| *refused == counter && !taken)?;
-        let (_, number) = self.refusable.remove(place)?;
-        self.parameters.retain(|question| question.number != number);
-        self.line.take_if(|line| line.number == number);
-        Some(number)
-    }
-}
-
-const fn refused() -> Payload<'static> {
-    Payload::Acknowledgement { counter: 0, taken: false }
-}
-
-const fn is_write(payload: &Payload<'_>) -> bool {
-    matches!(payload, Payload::WriteParameter { .. })
-}
-
-/// A parameter has this value: is that what became of the question? To a write, an answer to a reading before it is none.
-fn is_answer(question: &Question, value: f32, taken: bool) -> bool {
-    match question.payload {
-        // A time is rounded to whole microseconds.
-        Payload::WriteParameter { value: written, .. } => {
-            !taken || (value - written).abs() <= 1e-6 * written.abs().max(1.0)
-        }
-        _ => true,
     }
 }
 
@@ -270,17 +147,11 @@ fn put(writer: &mut MavlinkWriter, frames: &mut VecDeque<u8>, table: u16, number
     });
 }
 
-fn remember<T>(asked: &mut VecDeque<T>, question: T) {
-    if asked.len() >= ASKED {
-        asked.pop_front();
-    }
-    asked.push_back(question);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use stampfly_link::secure::Sample;
+    use stampfly_types::Duration;
     use stampfly_types::messages::GuidedCommand;
 
     const OURS: u16 = 7;
@@ -441,7 +312,7 @@ mod tests {
     #[test]
     fn the_station_is_told_that_there_is_no_room_and_what_is_refused_while_armed() {
         let mut line = Line::to(OURS);
-        let refused = format!("{:?}", refused());
+        let refused = format!("{REFUSED:?}");
         line.say(2, &guided(GuidedKind::Hold));
         assert_eq!(line.hear(&acknowledgement(FIRST.wrapping_add(2), false)), None, "it is said again");
         line.pass(2_000);
@@ -489,10 +360,10 @@ mod tests {
     fn what_is_never_answered_is_forgotten() {
         let mut line = Line::to(OURS);
         (0..1_000).for_each(|number| line.say(number, &Payload::ReadParameter { index: number }));
-        assert_eq!(line.translation.parameters.len(), ASKED);
+        assert_eq!(line.translation.questions.parameters(), 128);
         let newest = Payload::Parameter { index: 999, value: 0.0, taken: true };
         assert_eq!(line.hear(&newest), read(&newest, 999));
         line.pass(3_000);
-        assert_eq!(line.translation.parameters.len(), 0);
+        assert_eq!(line.translation.questions.parameters(), 0);
     }
 }

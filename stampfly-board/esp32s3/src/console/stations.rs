@@ -5,7 +5,7 @@ use crate::changes;
 use crate::clock::Clock;
 use crate::hands::Later;
 use crate::memory::restart;
-use crate::radio::LETTERS;
+use crate::radio::POST;
 use crate::record::Line;
 use stampfly_board::messages::ParameterChange;
 use stampfly_board::parameters;
@@ -73,16 +73,16 @@ impl Console {
             self.cable.report(&said);
         }
         // The radio has sent those before.
-        if LETTERS.is_empty() {
+        if POST.is_empty() {
             let Self { known, config, desk, .. } = self;
             let answered = known.vehicle(config, |vehicle| {
                 let mut room = Room::default();
                 let answer = desk.borrow_mut().questions.answer(now, vehicle, &mut room)?;
                 Some((Post::of(&answer.payload), answer.request))
             });
-            if let Some((letter, request)) = answered {
-                if let Some(letter) = letter {
-                    let _ = LETTERS.try_send(letter);
+            if let Some((post, request)) = answered {
+                if let Some(post) = post {
+                    let _ = POST.try_send(post);
                 }
                 if request != Request::Nothing {
                     let said = self.carry_out(request, false).await;

@@ -1,0 +1,164 @@
+//! Questions to a vehicle on the secure link that are asked until they are answered: parameters, and lines of the console.
+//!
+//! A question for a parameter is asked again as it was: to write a value twice is to write it once. A line has a number, so that the vehicle does once what it says, and is asked for
+//! the part of its answer that is missing. Commands are [`Commands`](stampfly_link::secure::Commands)'. No socket, no clock, no key.
+
+use stampfly_link::secure::Payload;
+use stampfly_types::{Duration, Instant};
+use std::collections::VecDeque;
+
+/// Questions whose answers are still to come. The station gives up after a while, and asks fewer in that time.
+const ASKED: usize = 128;
+/// A question is asked again after this long: the vehicle makes two answers every 20 ms, and eight wait.
+const AGAIN: Duration = Duration::from_millis(300);
+/// When a part of an answer is missing: the parts behind it that are on their way come before the one that is asked for.
+const GAP: Duration = Duration::from_millis(60);
+/// For this long. A station that gives up after three seconds has given up on none that may still be answered.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Seals a payload and sends it. Returns the counter of its frame; `None` when it could not be sealed.
+pub(super) type Send<'s> = &'s mut dyn FnMut(&Payload<'_>) -> Option<u32>;
+
+/// A question for a parameter.
+#[derive(Clone, Copy, Debug)]
+struct Parameter {
+    number: u16,
+    index: u16,
+    /// What it is to be, if it is to be changed.
+    written: Option<f32>,
+    until: Instant,
+    again_at: Instant,
+}
+
+impl Parameter {
+    const fn payload(&self) -> Payload<'static> {
+        let index = self.index;
+        match self.written {
+            Some(value) => Payload::WriteParameter { index, value },
+            None => Payload::ReadParameter { index },
+        }
+    }
+
+    /// The parameter has this value: is that what became of the question? To a write, the answer to a reading before it is none.
+    fn is_answer(&self, value: f32, taken: bool) -> bool {
+        // A time is rounded to whole microseconds.
+        self.written.is_none_or(|written| !taken || (value - written).abs() <= 1e-6 * written.abs().max(1.0))
+    }
+}
+
+/// A line that is being answered.
+#[derive(Debug)]
+struct Line {
+    number: u16,
+    text: String,
+    /// Bytes of the answer that have come.
+    had: u16,
+    until: Instant,
+    again_at: Instant,
+}
+
+/// Questions of one station.
+#[derive(Debug)]
+pub(super) struct Questions {
+    /// A line's number is that of the station's question, counted from here.
+    first: u32,
+    parameters: VecDeque<Parameter>,
+    line: Option<Line>,
+    /// What a vehicle refuses while it is armed: counters of frames, and numbers of the questions in them.
+    refusable: VecDeque<(u32, u16)>,
+}
+
+impl Questions {
+    pub fn new(first: u32) -> Self {
+        Self { first, parameters: VecDeque::new(), line: None, refusable: VecDeque::new() }
+    }
+
+    /// Takes a question. `false` when it is none of these.
+    pub fn ask(&mut self, now: Instant, number: u16, payload: &Payload<'_>) -> bool {
+        let (until, again_at) = (now + PATIENCE, now);
+        match *payload {
+            Payload::ReadParameter { index } => {
+                let question = Parameter { number, index, written: None, until, again_at };
+                remember(&mut self.parameters, question);
+            }
+            Payload::WriteParameter { index, value } => {
+                // The newer value is the one that stays: the older is not said again.
+                let is_older = |question: &&mut Parameter| question.index == index && question.written.is_some();
+                self.parameters.iter_mut().filter(is_older).for_each(|older| older.again_at = older.until);
+                let question = Parameter { number, index, written: Some(value), until, again_at };
+                remember(&mut self.parameters, question);
+            }
+            Payload::Line(text) => self.line = Some(Line { number, text: text.to_owned(), had: 0, until, again_at }),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Asks what is due to be asked, for the first time or again.
+    pub fn poll(&mut self, now: Instant, send: Send<'_>) {
+        let Self { first, parameters, line, refusable } = self;
+        parameters.retain(|question| now < question.until);
+        for question in parameters.iter_mut().filter(|question| now >= question.again_at) {
+            question.again_at = now + AGAIN;
+            let counter = send(&question.payload());
+            if let Some(counter) = counter.filter(|_| question.written.is_some()) {
+                remember(refusable, (counter, question.number));
+            }
+        }
+        line.take_if(|line| now >= line.until);
+        if let Some(line) = line.as_mut().filter(|line| now >= line.again_at) {
+            line.again_at = now + AGAIN;
+            let number = first.wrapping_add(line.number.into());
+            if let Some(counter) = send(&Payload::Question { number, from: line.had, line: &line.text }) {
+                remember(refusable, (counter, line.number));
+            }
+        }
+    }
+
+    /// The number of the question that is answered with a parameter's value. Zero, which no question has, when nobody has asked.
+    pub fn parameter(&mut self, index: u16, value: f32, taken: bool) -> u16 {
+        let is_asked = |question: &Parameter| question.index == index && question.is_answer(value, taken);
+        let place = self.parameters.iter().position(is_asked);
+        place.and_then(|place| self.parameters.remove(place)).map_or(0, |question| question.number)
+    }
+
+    /// The number of the question that the next part of an answer belongs to. Behind a gap it is none, and is asked for once more.
+    pub fn part(&mut self, now: Instant, number: u32, from: u16, text: &str, last: bool) -> Option<u16> {
+        let first = self.first;
+        let line = self.line.as_mut().filter(|line| first.wrapping_add(line.number.into()) == number)?;
+        if from != line.had {
+            if from > line.had {
+                line.again_at = line.again_at.min(now + GAP);
+            }
+            return None;
+        }
+        let question = line.number;
+        (line.had, line.until, line.again_at) = (from.saturating_add(text.len() as u16), now + PATIENCE, now + AGAIN);
+        if last {
+            self.line = None;
+        }
+        Some(question)
+    }
+
+    /// The number of the question that was in a frame which was refused.
+    pub fn refused(&mut self, counter: u32) -> Option<u16> {
+        // The newest: sessions before this one had the same counters.
+        let place = self.refusable.iter().rposition(|(refused, _)| *refused == counter)?;
+        let (_, number) = self.refusable.remove(place)?;
+        self.parameters.retain(|question| question.number != number);
+        self.line.take_if(|line| line.number == number);
+        Some(number)
+    }
+
+    #[cfg(test)]
+    pub fn parameters(&self) -> usize {
+        self.parameters.len()
+    }
+}
+
+fn remember<T>(asked: &mut VecDeque<T>, question: T) {
+    if asked.len() >= ASKED {
+        asked.pop_front();
+    }
+    asked.push_back(question);
+}
