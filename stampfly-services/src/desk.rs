@@ -38,8 +38,8 @@ enum Stage {
     Answering,
     /// The board does what was asked.
     Board,
-    /// It has said what came of it.
-    Done(String<PIECE>),
+    /// What came of it, which begins behind so many bytes of the reply. It is kept, so that nothing is done again for a station that has not heard it.
+    Done(String<PIECE>, usize),
 }
 
 #[derive(Clone, Debug)]
@@ -185,7 +185,10 @@ impl Desk {
             }
             Payload::Question { number, from, line } => match &mut self.line {
                 Some(again) if again.asked == Asked::Radio(number) => {
-                    (again.sent, again.is_said) = (from.into(), false);
+                    // While the board works, what comes next is its report.
+                    if !matches!(again.stage, Stage::Board) {
+                        (again.sent, again.is_said) = (from.into(), false);
+                    }
                     true
                 }
                 Some(Line { stage: Stage::Board, .. }) => false,
@@ -228,12 +231,15 @@ impl Desk {
             return Some(Answer { number, payload, request: Request::Nothing });
         }
         let line = self.line.as_mut().filter(|line| !line.is_said)?;
-        room.0.start_at(if let Stage::Done(_) = line.stage { 0 } else { line.sent });
         let request = match &line.stage {
             Stage::Board => return None,
             // An error is the end of the part. Longer replies than one only show something: those lines are answered again.
-            Stage::Answering => answer(&line.text, now, vehicle, room).unwrap_or(Request::Nothing),
-            Stage::Done(report) => {
+            Stage::Answering => {
+                room.0.start_at(line.sent);
+                answer(&line.text, now, vehicle, room).unwrap_or(Request::Nothing)
+            }
+            Stage::Done(report, at) => {
+                room.0.start_at(line.sent.saturating_sub(*at));
                 _ = fmt::Write::write_str(room, report);
                 Request::Nothing
             }
@@ -248,6 +254,11 @@ impl Desk {
             line.stage = Stage::Board;
         } else if last {
             line.is_said = true;
+            if from == 0
+                && let Ok(whole) = String::try_from(text)
+            {
+                line.stage = Stage::Done(whole, 0);
+            }
         }
         let (number, payload) = match asked {
             Asked::Cable(number) => (number, Payload::Reply { text, last }),
@@ -258,11 +269,11 @@ impl Desk {
 
     /// The board has done what it was asked for, or not.
     pub fn report(&mut self, what: &dyn fmt::Display) {
-        if let Some(Line { stage: stage @ Stage::Board, .. }) = &mut self.line {
+        if let Some(Line { stage: stage @ Stage::Board, sent, .. }) = &mut self.line {
             let mut text = String::new();
             // What is too long is cut.
             _ = fmt::Write::write_fmt(&mut text, format_args!("{what}"));
-            *stage = Stage::Done(text);
+            *stage = Stage::Done(text, *sent);
         }
     }
 }

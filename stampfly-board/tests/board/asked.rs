@@ -161,6 +161,15 @@ fn with_the_key_parameters_are_read_and_written_and_the_console_answers() {
     let done = Payload::Part { number: 78, from: 0, text: "done", last: true };
     assert!(air.heard.iter().filter(|heard| **heard == format!("{done:?}")).count() > 1, "{:?}", air.heard);
 
+    // Nor does one that changes something by itself: what somebody has changed since then stays.
+    let set = Payload::Question { number: 79, from: 0, line: "param set eskf.gate 3.0" };
+    air.ask(&set);
+    air.ask(&Payload::WriteParameter { index, value: 3.25 });
+    air.heard.clear();
+    (0..3).for_each(|_| air.ask(&set));
+    assert_eq!(air.config.eskf.gate, 3.25);
+    assert!(air.heard.last().is_some_and(|heard| heard.contains("eskf.gate") && heard.ends_with("last: true }")));
+
     air.heard.clear();
     air.ask(&Payload::Line("param save"));
     air.turn();

@@ -20,7 +20,7 @@ const KILL_AGAIN: Duration = Duration::from_millis(20);
 /// What became of a command that was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The vehicle had no room for it, as often as it was said.
+    /// The vehicle had no room for it whenever it answered.
     NoRoom,
     /// No answer came, or a kill came before it. It may have been taken.
     Silent,
