@@ -4,7 +4,7 @@ mod air;
 
 use air::{Air, To};
 use proptest::prelude::*;
-use stampfly_link::secure::{Commands, MAX_FRAME, Outcome, Payload};
+use stampfly_link::secure::{Commands, MAX_FRAME, Payload};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant};
 
@@ -21,7 +21,7 @@ struct Pair {
     obeyed: Vec<GuidedKind>,
     has_room: bool,
     done: Vec<u32>,
-    over: Vec<(u32, Outcome)>,
+    over: Vec<u32>,
 }
 
 impl Pair {
@@ -87,7 +87,7 @@ proptest! {
         prop_assert!(!pair.commands.say(now, numbers[4], command(Hold)));
         pair.pass(110);
         // Each is answered once, as taken or as not; those that were taken came in their order, and those that are said to be were.
-        let mut answered: Vec<u32> = pair.done.iter().copied().chain(pair.over.iter().map(|(number, _)| *number)).collect();
+        let mut answered: Vec<u32> = pair.done.iter().copied().chain(pair.over.iter().copied()).collect();
         answered.sort_by_key(|number| number.wrapping_sub(first));
         prop_assert_eq!(&answered, &numbers[..4]);
         prop_assert!(pair.obeyed.len() >= pair.done.len());
@@ -115,12 +115,12 @@ proptest! {
         prop_assert!(pair.obeyed.len() > before);
         prop_assert!(pair.obeyed[before..].iter().all(|kind| *kind == GuidedKind::Kill));
         prop_assert_eq!(pair.done.last(), Some(&5));
-        prop_assert!(pair.over.iter().all(|(number, outcome)| *number < 4 && *outcome == Outcome::Silent));
+        prop_assert!(pair.over.iter().all(|number| *number < 4));
     }
 }
 
 #[test]
-fn a_vehicle_without_room_is_told_again_and_again_and_its_answer_is_the_last_word() {
+fn a_vehicle_without_room_is_told_again_and_again() {
     let mut pair = Pair::new(1, 0);
     pair.has_room = false;
     pair.commands.say(pair.air.now, 7, command(GuidedKind::Hold));
@@ -132,7 +132,7 @@ fn a_vehicle_without_room_is_told_again_and_again_and_its_answer_is_the_last_wor
     pair.has_room = false;
     pair.commands.say(pair.air.now, 8, command(GuidedKind::Land));
     pair.pass(110);
-    assert_eq!(pair.over, [(8, Outcome::NoRoom)]);
+    assert_eq!(pair.over, [8]);
 }
 
 #[test]
@@ -168,4 +168,36 @@ fn what_is_refused_while_armed_is_acknowledged_as_refused_by_its_counter() {
     line[20] ^= 1;
     assert!(air.deliver(To::Vehicle, &line).is_err());
     assert_eq!((air.vehicle.acknowledgement(), air.now > Instant::ZERO), (None, true));
+}
+
+#[test]
+fn a_kill_is_acknowledged_although_frames_come_in_pairs() {
+    let (mut air, mut commands, mut room) = (Air::joined(4), Commands::new(), [0; MAX_FRAME]);
+    assert!(commands.say(air.now, 7, command(GuidedKind::Kill)) && commands.say(air.now, 8, command(GuidedKind::Arm)));
+    let mut frames = Vec::new();
+    for _ in 0..3 {
+        air.now += air::PERIOD;
+        let payload = commands.next(air.now).expect("the kill");
+        frames.push(air.station.seal(air.now, &payload, &mut room).expect("sealed").to_vec());
+    }
+    // The first is plain. Then one with a number and one without, in one turn of the vehicle.
+    for frame in &mut frames[1..] {
+        let received = air.vehicle.receive(air.now, frame).expect("taken").expect("a command");
+        air.vehicle.acknowledge(&received, true);
+    }
+    assert_eq!(air.vehicle.acknowledgement(), Some(Payload::Acknowledgement { counter: 7, taken: true }));
+    assert!(commands.acknowledge(7, true));
+    assert!(matches!(commands.next(air.now), Some(Payload::Numbered { number: 8, .. })));
+}
+
+#[test]
+fn what_a_kill_has_ended_leaves_its_room_and_a_kill_by_the_sticks_ends_it_too() {
+    let (mut commands, now) = (Commands::new(), Instant::ZERO);
+    (0..4).for_each(|number| assert!(commands.say(now, number, command(GuidedKind::WayPoint))));
+    commands.say(now, 4, command(GuidedKind::Kill));
+    let over: Vec<_> = core::iter::from_fn(|| commands.over(now)).collect();
+    assert_eq!(over, [0, 1, 2, 3]);
+    assert!(commands.say(now, 5, command(GuidedKind::Arm)));
+    commands.end(now);
+    assert_eq!((commands.over(now), commands.over(now)), (Some(5), None), "the kill is still said");
 }

@@ -15,6 +15,8 @@ use stampfly_types::Instant;
 pub const LINE: usize = 80;
 /// Bytes of a reply's part: with its frame it fits into ESP-NOW and into a tunnel of MAVLink.
 pub const PIECE: usize = 120;
+/// Bytes of a reply that are kept: what a line says before the board does something, and what that says.
+const KEPT: usize = 2 * PIECE;
 /// Questions for parameters that wait.
 const QUESTIONS: usize = 8;
 
@@ -38,8 +40,8 @@ enum Stage {
     Answering,
     /// The board does what was asked.
     Board,
-    /// What came of it, which begins behind so many bytes of the reply. It is kept, so that nothing is done again for a station that has not heard it.
-    Done(String<PIECE>, usize),
+    /// What it has said and what came of it is kept, so that nothing is done again for a station that has not heard it.
+    Done,
 }
 
 #[derive(Clone, Debug)]
@@ -49,6 +51,9 @@ struct Line {
     stage: Stage,
     /// Bytes of the reply that are sent.
     sent: usize,
+    /// Of a reply that is kept, the end, and where that begins.
+    kept: String<KEPT>,
+    kept_at: usize,
     /// Everything is said. A station that has not heard it all asks again.
     is_said: bool,
 }
@@ -184,10 +189,12 @@ impl Desk {
                 self.begin(Asked::Cable(number), text)
             }
             Payload::Question { number, from, line } => match &mut self.line {
-                Some(again) if again.asked == Asked::Radio(number) => {
+                Some(again) if again.asked == Asked::Radio(number) && again.text == line => {
                     // While the board works, what comes next is its report.
                     if !matches!(again.stage, Stage::Board) {
-                        (again.sent, again.is_said) = (from.into(), false);
+                        // What is before it is not kept: its station is left waiting rather than told the rest alone.
+                        let first = if matches!(again.stage, Stage::Done) { again.kept_at } else { 0 };
+                        (again.sent, again.is_said) = (first.max(from.into()), false);
                     }
                     true
                 }
@@ -203,8 +210,9 @@ impl Desk {
     }
 
     fn begin(&mut self, asked: Asked, text: &str) -> bool {
+        let (stage, kept) = (Stage::Answering, String::new());
         let text = String::try_from(text).ok();
-        self.line = text.map(|text| Line { asked, text, stage: Stage::Answering, sent: 0, is_said: false });
+        self.line = text.map(|text| Line { asked, text, stage, sent: 0, kept, kept_at: 0, is_said: false });
         self.line.is_some()
     }
 
@@ -238,28 +246,25 @@ impl Desk {
                 room.0.start_at(line.sent);
                 answer(&line.text, now, vehicle, room).unwrap_or(Request::Nothing)
             }
-            Stage::Done(report, at) => {
-                room.0.start_at(line.sent.saturating_sub(*at));
-                _ = fmt::Write::write_str(room, report);
+            Stage::Done => {
+                room.0.start_at(line.sent.saturating_sub(line.kept_at));
+                _ = fmt::Write::write_str(room, &line.kept);
                 Request::Nothing
             }
         };
         let (asked, from) = (line.asked, line.sent);
         let text = whole(room);
-        // A part that is empty has begun within a character: no station that has heard the answer asks for that.
-        let is_cut = room.0.is_cut() && !text.is_empty() && from <= usize::from(u16::MAX);
-        let last = !is_cut && request_is_nothing(&request);
+        // A part that is empty has begun within a character, of a text that has changed since the part before: its station is left waiting, and gives up.
+        let is_over = room.0.is_cut() && (text.is_empty() || from > usize::from(u16::MAX));
+        let is_request = !request_is_nothing(&request);
+        let last = !room.0.is_cut() && !is_request;
         line.sent += text.len();
-        if !request_is_nothing(&request) {
-            line.stage = Stage::Board;
-        } else if last {
-            line.is_said = true;
-            if from == 0
-                && let Ok(whole) = String::try_from(text)
-            {
-                line.stage = Stage::Done(whole, 0);
-            }
+        if matches!(line.stage, Stage::Answering) && (is_request || (last && from == 0)) {
+            // A part is shorter.
+            _ = line.kept.push_str(text);
+            (line.kept_at, line.stage) = (from, if is_request { Stage::Board } else { Stage::Done });
         }
+        line.is_said = last || is_over;
         let (number, payload) = match asked {
             Asked::Cable(number) => (number, Payload::Reply { text, last }),
             Asked::Radio(number) => (0, Payload::Part { number, from: from as u16, text, last }),
@@ -269,11 +274,12 @@ impl Desk {
 
     /// The board has done what it was asked for, or not.
     pub fn report(&mut self, what: &dyn fmt::Display) {
-        if let Some(Line { stage: stage @ Stage::Board, sent, .. }) = &mut self.line {
-            let mut text = String::new();
+        if let Some(Line { stage: stage @ Stage::Board, kept, .. }) = &mut self.line {
+            let mut text = String::<PIECE>::new();
             // What is too long is cut.
             _ = fmt::Write::write_fmt(&mut text, format_args!("{what}"));
-            *stage = Stage::Done(text, *sent);
+            _ = kept.push_str(&text);
+            *stage = Stage::Done;
         }
     }
 }

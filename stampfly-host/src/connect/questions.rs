@@ -49,7 +49,9 @@ impl Parameter {
 /// A line that is being answered.
 #[derive(Debug)]
 struct Line {
-    number: u16,
+    /// The question's, and that which the vehicle knows it by.
+    question: u16,
+    number: u32,
     text: String,
     /// Bytes of the answer that have come.
     had: u16,
@@ -58,10 +60,8 @@ struct Line {
 }
 
 /// Questions of one station.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Questions {
-    /// A line's number is that of the station's question, counted from here.
-    first: u32,
     parameters: VecDeque<Parameter>,
     line: Option<Line>,
     /// What a vehicle refuses while it is armed: counters of frames, and numbers of the questions in them.
@@ -69,12 +69,8 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    pub fn new(first: u32) -> Self {
-        Self { first, parameters: VecDeque::new(), line: None, refusable: VecDeque::new() }
-    }
-
-    /// Takes a question. `false` when it is none of these.
-    pub fn ask(&mut self, now: Instant, number: u16, payload: &Payload<'_>) -> bool {
+    /// Takes a question, which a line's vehicle knows by another number. `false` when it is none of these.
+    pub fn ask(&mut self, now: Instant, number: u16, of_line: u32, payload: &Payload<'_>) -> bool {
         let (until, again_at) = (now + PATIENCE, now);
         match *payload {
             Payload::ReadParameter { index } => {
@@ -88,7 +84,10 @@ impl Questions {
                 let question = Parameter { number, index, written: Some(value), until, again_at };
                 remember(&mut self.parameters, question);
             }
-            Payload::Line(text) => self.line = Some(Line { number, text: text.to_owned(), had: 0, until, again_at }),
+            Payload::Line(text) => {
+                let text = text.to_owned();
+                self.line = Some(Line { question: number, number: of_line, text, had: 0, until, again_at });
+            }
             _ => return false,
         }
         true
@@ -96,7 +95,7 @@ impl Questions {
 
     /// Asks what is due to be asked, for the first time or again.
     pub fn poll(&mut self, now: Instant, send: Send<'_>) {
-        let Self { first, parameters, line, refusable } = self;
+        let Self { parameters, line, refusable } = self;
         parameters.retain(|question| now < question.until);
         for question in parameters.iter_mut().filter(|question| now >= question.again_at) {
             question.again_at = now + AGAIN;
@@ -108,9 +107,9 @@ impl Questions {
         line.take_if(|line| now >= line.until);
         if let Some(line) = line.as_mut().filter(|line| now >= line.again_at) {
             line.again_at = now + AGAIN;
-            let number = first.wrapping_add(line.number.into());
-            if let Some(counter) = send(&Payload::Question { number, from: line.had, line: &line.text }) {
-                remember(refusable, (counter, line.number));
+            let question = Payload::Question { number: line.number, from: line.had, line: &line.text };
+            if let Some(counter) = send(&question) {
+                remember(refusable, (counter, line.question));
             }
         }
     }
@@ -124,20 +123,30 @@ impl Questions {
 
     /// The number of the question that the next part of an answer belongs to. Behind a gap it is none, and is asked for once more.
     pub fn part(&mut self, now: Instant, number: u32, from: u16, text: &str, last: bool) -> Option<u16> {
-        let first = self.first;
-        let line = self.line.as_mut().filter(|line| first.wrapping_add(line.number.into()) == number)?;
+        let line = self.line.as_mut().filter(|line| line.number == number)?;
         if from != line.had {
             if from > line.had {
                 line.again_at = line.again_at.min(now + GAP);
             }
             return None;
         }
-        let question = line.number;
-        (line.had, line.until, line.again_at) = (from.saturating_add(text.len() as u16), now + PATIENCE, now + AGAIN);
-        if last {
-            self.line = None;
+        let question = line.question;
+        // That somebody works on it is no progress: he is not waited for without end.
+        if !text.is_empty() {
+            line.until = now + PATIENCE;
+        }
+        line.again_at = now + AGAIN;
+        match u16::try_from(text.len()).ok().and_then(|length| from.checked_add(length)) {
+            Some(had) if !last => line.had = had,
+            // No answer is so long.
+            _ => self.line = None,
         }
         Some(question)
+    }
+
+    /// The line is not said again.
+    pub fn end_line(&mut self) {
+        self.line = None;
     }
 
     /// The number of the question that was in a frame which was refused.
@@ -146,7 +155,7 @@ impl Questions {
         let place = self.refusable.iter().rposition(|(refused, _)| *refused == counter)?;
         let (_, number) = self.refusable.remove(place)?;
         self.parameters.retain(|question| question.number != number);
-        self.line.take_if(|line| line.number == number);
+        self.line.take_if(|line| line.question == number);
         Some(number)
     }
 
@@ -156,7 +165,8 @@ impl Questions {
     }
 }
 
-fn remember<T>(asked: &mut VecDeque<T>, question: T) {
+/// Takes the place of the oldest, where there are many.
+pub(super) fn remember<T>(asked: &mut VecDeque<T>, question: T) {
     if asked.len() >= ASKED {
         asked.pop_front();
     }

@@ -136,12 +136,15 @@ impl Sealed {
             let Ok(length) = self.socket.recv(&mut room) else { break };
             // The first was waited for; what else has come is there.
             self.socket.set_nonblocking(true)?;
-            let now = self.now();
+            let (now, session) = (self.now(), self.station.session());
             // What is refused is no word of the vehicle's.
             if let Some(frame) = room.get_mut(..length)
                 && let Ok(Some(received)) = self.station.receive(now, frame)
             {
                 self.translation.hear(now, &received.payload);
+            }
+            if session.is_some() && self.station.session() != session {
+                self.translation.renewed();
             }
         }
         self.socket.set_nonblocking(false)

@@ -5,10 +5,10 @@
 //! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again until it is answered, by [`Commands`] and
 //! [`Questions`]. No socket, no clock, no key.
 
-use super::questions::{Questions, Send};
+use super::questions::{Questions, Send, remember};
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
-use stampfly_link::secure::{Commands, Outcome, Payload};
+use stampfly_link::secure::{Commands, Payload};
 use stampfly_services::cable::{Assembly, Envelope, TYPE};
 use stampfly_types::Instant;
 use stampfly_types::messages::GuidedKind;
@@ -37,9 +37,11 @@ pub(super) struct Translation {
     /// Fingerprint of the station's tables.
     ours: u16,
     tables: Tables,
-    /// A command's number is that of the station's question, counted from here.
-    first: u32,
+    /// The number of the newest command or line, not that of the question: a station's signs of life are counted there as well, and come round.
+    counted: u32,
     commands: Commands,
+    /// Numbers of commands and of the questions that they are.
+    asked: VecDeque<(u32, u16)>,
     questions: Questions,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
@@ -54,9 +56,10 @@ impl Translation {
             writer: MavlinkWriter::new(VEHICLE[0], VEHICLE[1]),
             ours: 0,
             tables: Tables::Unknown,
-            first,
+            counted: first,
             commands: Commands::new(),
-            questions: Questions::new(first),
+            asked: VecDeque::new(),
+            questions: Questions::default(),
             frames: VecDeque::new(),
         }
     }
@@ -80,11 +83,19 @@ impl Translation {
                 continue;
             }
             // What says nothing but that somebody is there comes again anyway.
+            self.counted = self.counted.wrapping_add(1);
+            // The station knows by itself what is not answered.
+            while self.commands.over(now).is_some() {}
             if let Some(command) = payload.command().filter(|command| command.kind != GuidedKind::None) {
-                if !self.commands.say(now, self.first.wrapping_add(number.into()), command) {
+                if self.commands.say(now, self.counted, command) {
+                    remember(&mut self.asked, (self.counted, number));
+                } else {
                     put(&mut self.writer, &mut self.frames, table, number, &REFUSED);
                 }
-            } else if !self.questions.ask(now, number, &payload) {
+            } else if !self.questions.ask(now, number, self.counted, &payload) {
+                if payload.is_kill() {
+                    self.commands.end(now);
+                }
                 send(&payload);
             }
         }
@@ -96,14 +107,13 @@ impl Translation {
         if let Some(payload) = self.commands.next(now) {
             send(&payload);
         }
-        while let Some((number, outcome)) = self.commands.over(now) {
-            // The station knows by itself what is not answered.
-            if outcome == Outcome::NoRoom {
-                let number = number.wrapping_sub(self.first) as u16;
-                put(&mut self.writer, &mut self.frames, self.ours, number, &REFUSED);
-            }
-        }
+        while self.commands.over(now).is_some() {}
         self.questions.poll(now, send);
+    }
+
+    /// There is another session: the vehicle may have started anew, and done what a line said before that.
+    pub fn renewed(&mut self) {
+        self.questions.end_line();
     }
 
     /// Takes what the vehicle says.
@@ -111,11 +121,20 @@ impl Translation {
         if let Payload::Tables { fingerprint } = *payload {
             self.tables = if fingerprint == self.ours { Tables::Ours } else { Tables::Others(fingerprint) };
         }
+        if self.tables == Tables::Unknown {
+            // It is said again.
+            return;
+        }
         let (number, payload) = match *payload {
             Payload::Acknowledgement { counter, taken } => {
-                let is_done = self.commands.acknowledge(counter, taken);
-                let done = is_done.then(|| counter.wrapping_sub(self.first) as u16);
-                (done.or_else(|| if taken { None } else { self.questions.refused(counter) }), *payload)
+                let number = if self.commands.acknowledge(counter, taken) {
+                    self.asked.iter().find(|(number, _)| *number == counter).map(|(_, question)| *question)
+                } else if taken {
+                    None
+                } else {
+                    self.questions.refused(counter)
+                };
+                (number, *payload)
             }
             Payload::Parameter { index, value, taken } => {
                 (Some(self.questions.parameter(index, value, taken)), *payload)
@@ -152,10 +171,10 @@ mod tests {
     use super::*;
     use stampfly_link::secure::Sample;
     use stampfly_types::Duration;
-    use stampfly_types::messages::GuidedCommand;
+    use stampfly_types::messages::{GuidedCommand, PilotInput};
 
     const OURS: u16 = 7;
-    /// The number before that of the first command: those of the next go on at zero.
+    /// Behind what [`Line::to`] says and one command more, numbers go on at zero.
     const FIRST: u32 = u32::MAX - 2;
 
     /// The station's end of the line, a radio that seals everything, and what is between them.
@@ -312,14 +331,13 @@ mod tests {
     #[test]
     fn the_station_is_told_that_there_is_no_room_and_what_is_refused_while_armed() {
         let mut line = Line::to(OURS);
-        let refused = format!("{REFUSED:?}");
         line.say(2, &guided(GuidedKind::Hold));
         assert_eq!(line.hear(&acknowledgement(FIRST.wrapping_add(2), false)), None, "it is said again");
         line.pass(2_000);
-        assert_eq!(line.read(), Some((OURS, 2, refused.clone())));
+        assert_eq!(line.read(), None, "nobody knows whether it was taken in the end");
 
         (3..=7).for_each(|number| line.say(number, &guided(GuidedKind::WayPoint)));
-        assert_eq!(line.read(), Some((OURS, 7, refused)));
+        assert_eq!(line.read(), Some((OURS, 7, format!("{REFUSED:?}"))));
 
         line.say(8, &Payload::Line("reboot"));
         let armed = acknowledgement(line.counter, false);
@@ -336,7 +354,7 @@ mod tests {
     fn a_part_that_is_lost_is_asked_for_and_the_answer_has_no_hole() {
         let mut line = Line::to(OURS);
         line.say(8, &Payload::Line("param list"));
-        let part = |from, text, last| Payload::Part { number: FIRST.wrapping_add(8), from, text, last };
+        let part = |from, text, last| Payload::Part { number: FIRST.wrapping_add(2), from, text, last };
         let reply = |text, last| read(&Payload::Reply { text, last }, 8);
         assert_eq!(line.hear(&part(0, "a is 1\n", false)), reply("a is 1\n", false));
         assert_eq!(line.hear(&part(0, "a is 1\n", false)), None);
@@ -345,7 +363,10 @@ mod tests {
         line.pass(40);
         assert_eq!(line.hear(&part(21, "d is 4\n", true)), None);
         line.pass(20);
-        assert_eq!(line.sent.last().map(String::as_str), Some("Question { number: 5, from: 7, line: \"param list\" }"));
+        assert_eq!(
+            line.sent.last().map(String::as_str),
+            Some("Question { number: 4294967295, from: 7, line: \"param list\" }")
+        );
         assert_eq!(line.hear(&part(7, "b is 2\n", false)), reply("b is 2\n", false));
         // Of another line, which was given up.
         let other = Payload::Part { number: 4, from: 14, text: "", last: true };
@@ -354,6 +375,30 @@ mod tests {
         line.sent.clear();
         line.pass(1_000);
         assert_eq!(line.sent.len(), 0);
+    }
+
+    #[test]
+    fn a_kill_by_the_switch_ends_commands_and_another_session_ends_a_line() {
+        let mut line = Line::to(OURS);
+        line.say(2, &guided(GuidedKind::TakeOff));
+        line.say(3, &Payload::Line("reboot"));
+        line.say(4, &Payload::Sticks(PilotInput { kill: true, ..PilotInput::default() }));
+        line.translation.renewed();
+        line.sent.clear();
+        line.pass(2_000);
+        assert!(line.sent.is_empty(), "{:?}", line.sent);
+    }
+
+    #[test]
+    fn before_the_tables_are_known_nothing_is_an_answer() {
+        let mut line = Line::new();
+        line.say(1, &Payload::Line("param list"));
+        let part = |from, text, last| Payload::Part { number: FIRST + 1, from, text, last };
+        assert_eq!(line.hear(&part(0, "a is 1", true)), None);
+        line.hear(&Payload::Tables { fingerprint: OURS });
+        line.pass(300);
+        assert!(line.sent.last().is_some_and(|sent| sent.contains("from: 0")), "{:?}", line.sent);
+        assert_eq!(line.hear(&part(0, "a is 1", true)), read(&Payload::Reply { text: "a is 1", last: true }, 1));
     }
 
     #[test]

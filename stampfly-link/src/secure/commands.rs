@@ -2,7 +2,8 @@
 //!
 //! One after the other, in the order they were given. The vehicle takes each once, however often it hears it, so a second way-point is never the first one said
 //! again. A kill goes before all others and ends them. For commands; sticks are newer every time, and to write a parameter twice is to write it once. No
-//! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station), and hand back what is acknowledged.
+//! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station), and hand back what is acknowledged. A vehicle remembers the
+//! newest number alone: it may take a command twice that is said again after it has restarted, or after another station with its key has commanded.
 
 use super::payload::Payload;
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
@@ -17,22 +18,12 @@ const AGAIN: Duration = Duration::from_millis(60);
 /// Between two frames of a kill.
 const KILL_AGAIN: Duration = Duration::from_millis(20);
 
-/// What became of a command that was not taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The vehicle had no room for it whenever it answered.
-    NoRoom,
-    /// No answer came, or a kill came before it. It may have been taken.
-    Silent,
-}
-
 #[derive(Clone, Copy, Debug)]
 struct Said {
     number: u32,
     command: GuidedCommand,
     until: Instant,
     again_at: Instant,
-    outcome: Outcome,
 }
 
 impl Said {
@@ -44,7 +35,7 @@ impl Said {
 /// Commands on their way to one vehicle.
 ///
 /// ```
-/// use stampfly_link::secure::{Commands, Outcome, Payload};
+/// use stampfly_link::secure::{Commands, Payload};
 /// use stampfly_types::{Duration, Instant, messages::{GuidedCommand, GuidedKind}};
 /// let (mut commands, now) = (Commands::new(), Instant::ZERO);
 /// let command = |kind| GuidedCommand { kind, ..GuidedCommand::default() };
@@ -57,7 +48,7 @@ impl Said {
 /// assert_eq!(commands.next(later), Some(arm), "nothing was heard of it");
 /// assert!(commands.acknowledge(41, true));
 /// assert!(matches!(commands.next(later), Some(Payload::Numbered { number: 42, .. })));
-/// assert_eq!(commands.over(now + Duration::from_secs(2)), Some((42, Outcome::Silent)));
+/// assert_eq!(commands.over(now + Duration::from_secs(2)), Some(42));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Commands {
@@ -83,12 +74,12 @@ impl Commands {
     /// Takes a command. `number` is one that no command to this vehicle had lately: count on from a random one, or after a
     /// restart a vehicle could think that it has taken it. `false` when four wait. For a kill there is always room; a kill takes the place of a kill.
     pub fn say(&mut self, now: Instant, number: u32, command: GuidedCommand) -> bool {
-        let said = Said { number, command, until: now + PATIENCE, again_at: now, outcome: Outcome::Silent };
+        let said = Said { number, command, until: now + PATIENCE, again_at: now };
         if !said.is_kill() {
             let place = self.waiting.iter_mut().take(WAITING).find(|place| place.is_none());
             return place.map(|place| *place = Some(said)).is_some();
         }
-        self.waiting.iter_mut().flatten().for_each(|waiting| waiting.until = now);
+        self.end(now);
         if self.waiting.first().is_some_and(|first| first.is_none_or(|first| !first.is_kill())) {
             // Its last place is free: commands leave it so.
             self.waiting.rotate_right(1);
@@ -96,6 +87,11 @@ impl Commands {
         self.waiting.first_mut().into_iter().for_each(|first| *first = Some(said));
         self.was_plain = false;
         true
+    }
+
+    /// Ends the commands that wait: the motors are to be off, and somebody has said so otherwise than with a command.
+    pub fn end(&mut self, now: Instant) {
+        self.waiting.iter_mut().flatten().filter(|said| !said.is_kill()).for_each(|said| said.until = now);
     }
 
     /// What is to be sealed and sent now. Ask every 20 ms or so.
@@ -112,24 +108,23 @@ impl Commands {
         Some(if self.was_plain { Payload::Kill } else { numbered })
     }
 
-    /// Takes an [acknowledgement](Payload::Acknowledgement). Was the command with this number taken, and is that news?
+    /// Takes an [acknowledgement](Payload::Acknowledgement). Was the command with this number taken, and is that news? One that was not, because the
+    /// vehicle had no room for it, is said again.
     pub fn acknowledge(&mut self, number: u32, taken: bool) -> bool {
-        let Some(said) = self.waiting.first_mut().and_then(Option::as_mut) else { return false };
-        if said.number != number {
-            return false;
-        }
-        said.outcome = Outcome::NoRoom;
-        if taken {
+        let is_first = self.waiting.first().is_some_and(|first| first.is_some_and(|said| said.number == number));
+        let is_done = taken && is_first;
+        if is_done {
             self.remove(0);
         }
-        taken
+        is_done
     }
 
-    /// A command that was not taken in two seconds, and what became of it. Ask until there is none.
-    pub fn over(&mut self, now: Instant) -> Option<(u32, Outcome)> {
+    /// The number of a command that was not acknowledged in two seconds, or that a kill has ended. Nobody knows whether it was taken. Ask until there is
+    /// none, before anything is [said](Self::say): until then it takes its room.
+    pub fn over(&mut self, now: Instant) -> Option<u32> {
         let is_over = |said: &Option<Said>| said.is_some_and(|said| now >= said.until);
         let place = self.waiting.iter().position(is_over)?;
-        self.remove(place).map(|said| (said.number, said.outcome))
+        self.remove(place).map(|said| said.number)
     }
 
     fn remove(&mut self, place: usize) -> Option<Said> {

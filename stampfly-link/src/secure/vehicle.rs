@@ -81,10 +81,18 @@ pub struct Vehicle {
     taken: Option<Instant>,
     /// The number of the newest numbered command that was taken.
     numbered: Option<u32>,
-    /// What is to be acknowledged: counter or number, and whether it was taken.
-    acknowledgement: Option<(u32, bool)>,
+    acknowledgement: Option<Acknowledged>,
     budget: Budget,
     tally: Tally,
+}
+
+/// What is to be acknowledged.
+#[derive(Clone, Copy, Debug)]
+struct Acknowledged {
+    /// The counter of the frame, or the number of its command.
+    counter: u32,
+    taken: bool,
+    is_number: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -205,7 +213,7 @@ impl Vehicle {
             let is_for_the_ground =
                 matches!(payload, Payload::WriteParameter { .. } | Payload::Line(_) | Payload::Question { .. });
             if self.armed && is_for_the_ground {
-                self.acknowledgement = Some((header.counter, false));
+                self.note(Acknowledged { counter: header.counter, taken: false, is_number: false });
                 return Err(Refused::Armed);
             }
         }
@@ -214,7 +222,7 @@ impl Vehicle {
             && self.numbered == Some(number)
         {
             // The acknowledgement was lost, or is on its way.
-            self.acknowledgement = Some((number, true));
+            self.note(Acknowledged { counter: number, taken: true, is_number: true });
             return Ok(None);
         }
         Ok(Some(Received { payload, counter: header.counter, age: age.unwrap_or_default() }))
@@ -289,19 +297,27 @@ impl Vehicle {
     /// Notes what became of a command that [`Vehicle::receive`] has returned: whether there was room for it. A
     /// [numbered](Payload::Numbered) one that was taken is not returned again, however often it is said.
     pub fn acknowledge(&mut self, received: &Received<'_>, taken: bool) {
-        let counter = match received.payload {
+        let acknowledged = match received.payload {
             Payload::Numbered { number, .. } => {
                 self.numbered = if taken { Some(number) } else { self.numbered };
-                number
+                Acknowledged { counter: number, taken, is_number: true }
             }
-            _ => received.counter,
+            _ => Acknowledged { counter: received.counter, taken, is_number: false },
         };
-        self.acknowledgement = Some((counter, taken));
+        self.note(acknowledged);
+    }
+
+    /// Somebody waits for a number: what came in the same turn without one does not take its place.
+    fn note(&mut self, acknowledged: Acknowledged) {
+        if acknowledged.is_number || self.acknowledgement.is_none_or(|waiting| !waiting.is_number) {
+            self.acknowledgement = Some(acknowledged);
+        }
     }
 
     /// What the station is to be told of its newest command, or of what was [refused with motors armed](Refused::Armed); once. [Seal](Vehicle::seal) it.
     pub fn acknowledgement(&mut self) -> Option<Payload<'static>> {
-        self.acknowledgement.take().map(|(counter, taken)| Payload::Acknowledgement { counter, taken })
+        let Acknowledged { counter, taken, .. } = self.acknowledgement.take()?;
+        Some(Payload::Acknowledgement { counter, taken })
     }
 
     /// Is there a session, and has its station not been silent?
