@@ -535,7 +535,7 @@ fn l11_an_armed_vehicle_takes_no_parameters_and_no_lines() {
         let frame = air.seal(&asks);
         assert_eq!(air.deliver(To::Vehicle, &frame), Ok(true), "what only asks is harmless");
     }
-    assert_eq!(air.vehicle.tally().armed, 2);
+    assert_eq!(air.vehicle.tally().armed, 3);
 }
 
 #[test]
