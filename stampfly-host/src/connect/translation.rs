@@ -82,10 +82,10 @@ impl Translation {
             if !passes {
                 continue;
             }
-            // What says nothing but that somebody is there comes again anyway.
             self.counted = self.counted.wrapping_add(1);
             // The station knows by itself what is not answered.
             while self.commands.over(now).is_some() {}
+            // What says nothing but that somebody is there comes again anyway.
             if let Some(command) = payload.command().filter(|command| command.kind != GuidedKind::None) {
                 if self.commands.say(now, self.counted, command) {
                     remember(&mut self.asked, (self.counted, number));

@@ -124,8 +124,6 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         }
         let command = match payload {
             Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return cockpit.alive(now, seat),
-            Payload::Guided(command) | Payload::Numbered { command, .. } => command,
-            Payload::Kill => GuidedCommand { kind: GuidedKind::Kill, ..GuidedCommand::default() },
             // They come again and again, and are not answered.
             Payload::Sticks(input) => {
                 _ = cockpit.steer(now, seat, &input);
@@ -135,12 +133,15 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
                 let taken = self.watches.watch(now, topic, period);
                 return self.say(number, &Payload::Acknowledgement { counter: number.into(), taken }, put);
             }
-            question => {
-                if !self.desk.ask(number, &question) {
-                    self.say(number, &Payload::Reply { text: "one question after the other", last: true }, put);
+            payload => match payload.command() {
+                Some(command) => command,
+                None => {
+                    if !self.desk.ask(number, &payload) {
+                        self.say(number, &Payload::Reply { text: "one question after the other", last: true }, put);
+                    }
+                    return;
                 }
-                return;
-            }
+            },
         };
         match cockpit.guide(now, seat, command) {
             Ok(()) => self.say(number, &Payload::Acknowledgement { counter: number.into(), taken: true }, put),
