@@ -29,10 +29,12 @@ SOURCES = {
     72: (0x6008_1040, 0x1F_FFFF),  # SPI
 }
 QUICK = (22, 23)
+SLOW = tuple(number for number in SOURCES if number not in QUICK)
 # The firmware uses software interrupts 0 and 1; this one is number 3.
 SPARE, SPARE_REGISTER = 25, FROM_CPU + 12
 CHUNK = 64
-SOON = 400
+# Instructions within which a software interrupt has to be taken: more than the longest handler has.
+SOON = 100_000
 # Sources other than the software interrupts are looked at every so many chunks.
 PATIENCE = 16
 
@@ -50,17 +52,39 @@ class Interrupts:
             self.chunks += 1
             # What asked a moment ago may have been answered since: a handler that is called for nothing clears what comes next.
             if self.slow or self.chunks % PATIENCE == 0:
-                self.slow = self._asking(number for number in SOURCES if number not in QUICK)
-            self._interrupt(self.slow | self._asking(QUICK))
-            # A thread that has asked to be exchanged counts on not running on: until it is, every instruction may be interrupted.
-            for _ in range(SOON):
-                asking = self._asking(QUICK)
-                if not asking:
-                    break
-                self._interrupt(self.slow | asking)
-                self.sim.run_for("6ns")
+                self.slow = self._asking(SLOW)
+            if self._look():
+                self._exchange()
+            elif self.slow:
+                self._step(self.slow)
 
-    def _asking(self, numbers):
+    def _exchange(self):
+        """Runs until no software interrupt asks: a thread that has asked to be exchanged counts on not running on.
+
+        So every single instruction may be interrupted, the last one of another handler too. A thread that ran one instruction on
+        might find nothing to do, and would say so when it is continued, whatever has come meanwhile.
+        """
+        for _ in range(SOON):
+            self.slow = self._asking(SLOW)
+            quick = self._look()
+            if not quick:
+                return
+            self._step(self.slow | quick)
+        raise RuntimeError("a software interrupt is not taken")
+
+    def _look(self) -> int:
+        """Shows the state of the sources, and returns which software interrupts ask.
+
+        A state that lags behind would tell the next one that asks that it has been heard.
+        """
+        quick = self._asking(QUICK)
+        if self.slow | quick != self.shown:
+            self.shown = self.slow | quick
+            for word in range(3):
+                self.sim.write_u32(STATUS + 4 * word, self.shown >> 32 * word & 0xFFFF_FFFF)
+        return quick
+
+    def _asking(self, numbers: tuple[int, ...]) -> int:
         asking = 0
         for number in numbers:
             address, mask = SOURCES[number]
@@ -68,13 +92,8 @@ class Interrupts:
                 asking |= 1 << number
         return asking
 
-    def _interrupt(self, asking: int):
-        if asking != self.shown:
-            for word in range(3):
-                self.sim.write_u32(STATUS + 4 * word, asking >> 32 * word & 0xFFFF_FFFF)
-            self.shown = asking
-        if not asking:
-            return
+    def _step(self, asking: int):
+        """Runs one instruction, in whose place the core may be interrupted."""
         plic = struct.unpack("<38I", self.sim.read_memory(PLIC, 152))
         enabled, priorities, threshold = plic[0], plic[4:36], plic[36]
         lines = []
@@ -83,10 +102,12 @@ class Interrupts:
                 line = self.sim.read_u32(MATRIX + 4 * number) & 31
                 if line and enabled >> line & 1 and priorities[line] >= max(threshold, 1):
                     lines.append((priorities[line], -line, number))
-        if lines:
-            _, line, number = max(lines)
-            self.offered[number] = self.offered.get(number, 0) + 1
-            self._offer(-line)
+        if not lines:
+            self.sim.run_for("6ns")
+            return
+        _, line, number = max(lines)
+        self.offered[number] = self.offered.get(number, 0) + 1
+        self._offer(-line)
 
     def _offer(self, line: int):
         write = self.sim.write_u32

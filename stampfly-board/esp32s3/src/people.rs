@@ -4,8 +4,8 @@ use crate::buzzer::Channel;
 use crate::clock::Clock;
 use crate::pins::PeoplePins;
 use alloc::boxed::Box;
-use embassy_time::{Duration, Ticker};
-use esp_hal::Blocking;
+use embassy_time::{Duration, Ticker, with_timeout};
+use esp_hal::Async;
 use esp_hal::gpio::{Input, InputConfig, Level, Output, OutputConfig, Pull};
 use esp_hal::peripherals::RMT;
 use esp_hal::rmt::Rmt;
@@ -19,8 +19,12 @@ use stampfly_drivers::{Button, Buzzer, Indicator, Lights, PinButton, Timebase};
 /// The clock of the unit that makes the lights' pulses.
 const PULSE_CLOCK: Rate = Rate::from_mhz(80);
 
+/// A chain takes 30 µs a light and 300 µs to latch. One that has not ended by then has a unit that never will, and this
+/// core has a radio to serve.
+const LONGEST_WRITE: Duration = Duration::from_millis(2);
+
 /// The writer of a chain of lights, with room for `N` pulses.
-type Chain<const N: usize> = RmtSmartLeds<'static, N, Blocking, RGB8, color_order::Grb>;
+type Chain<const N: usize> = RmtSmartLeds<'static, N, Async, RGB8, color_order::Grb>;
 
 /// What they need.
 pub struct Parts {
@@ -34,7 +38,7 @@ pub struct Parts {
 #[embassy_executor::task]
 pub async fn run(parts: Box<Parts>) {
     let Parts { pulses, pins, mut indicator, mut button } = *parts;
-    let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one");
+    let pulses = Rmt::new(pulses, PULSE_CLOCK).expect("the unit divides its clock by one").into_async();
     // Stays on: what this returns can be dropped.
     Output::new(pins.status_light_supply, Level::High, OutputConfig::default());
     let status: Chain<{ buffer_size::<RGB8>(1) }> =
@@ -55,12 +59,11 @@ pub async fn run(parts: Box<Parts>) {
             button.button_contact.publish(now, &ButtonContact { pressed: contact.is_pressed() });
         }
         if let Some(sample) = indicator.signal.latest() {
-            status.show(&sample.data);
-            body.show(&sample.data);
+            // What is given up is written again the next time.
+            let _ = with_timeout(LONGEST_WRITE, status.update(&sample.data, now)).await;
+            let _ = with_timeout(LONGEST_WRITE, body.update(&sample.data, now)).await;
             buzzer.show(&sample.data);
         }
-        status.step(now);
-        body.step(now);
         // A buzzer that refuses is tried again the next time.
         let _ = buzzer.step(now);
     }

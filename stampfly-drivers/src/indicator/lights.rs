@@ -1,7 +1,7 @@
 //! Lights with a chip in each, in a chain on one pin: WS2812 and its relatives.
 
 use super::Indicator;
-use smart_leds_trait::{RGB8, SmartLedsWrite};
+use smart_leds_trait::{RGB8, SmartLedsWrite, SmartLedsWriteAsync};
 use stampfly_types::messages::Signal;
 use stampfly_types::{Duration, Instant};
 
@@ -13,6 +13,9 @@ const REFRESH: Duration = Duration::from_secs(1);
 /// [`show`](Indicator::show) writes when the colour changes, and again after a write that failed; for as long as the
 /// writer takes, which is 30 µs per light. [`step`](Self::step) writes again once a second: a light that lost its supply
 /// for a moment is dark and cannot say so. The order of the colours on the wire is the writer's.
+///
+/// A writer that waits for its unit without a limit holds everything else on its core if the unit never ends. An async
+/// writer does not: [`update`](Self::update) is both in one, and can be given up at any time.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -91,6 +94,49 @@ where
     }
 }
 
+impl<W: SmartLedsWriteAsync, const N: usize> Lights<W, N>
+where
+    RGB8: Into<W::Color>,
+{
+    /// Writes when the colour has changed, when the last write failed or was given up, and once a second. To be called
+    /// as often as anybody likes, and to be given up after a time: a writer may wait for its unit for ever.
+    ///
+    /// ```
+    /// # use core::convert::Infallible;
+    /// # use smart_leds_trait::{RGB8, SmartLedsWriteAsync};
+    /// # #[derive(Default)] struct Chain(Vec<RGB8>);
+    /// # impl SmartLedsWriteAsync for Chain {
+    /// #     type Error = Infallible;
+    /// #     type Color = RGB8;
+    /// #     async fn write<T: IntoIterator<Item = I>, I: Into<RGB8>>(&mut self, lights: T) -> Result<(), Infallible> {
+    /// #         self.0 = lights.into_iter().map(Into::into).collect();
+    /// #         Ok(())
+    /// #     }
+    /// # }
+    /// use stampfly_drivers::{Lights, blocking::block_on};
+    /// use stampfly_types::{Instant, messages::Signal};
+    ///
+    /// let mut body = Lights::<_, 2>::body(Chain::default());
+    /// let signal = Signal { body: [32, 0, 32], ..Default::default() };
+    /// block_on(body.update(&signal, Instant::from_secs(5)));
+    /// assert_eq!(body.writer().0, [RGB8::new(32, 0, 32); 2]);
+    /// ```
+    pub async fn update(&mut self, signal: &Signal, now: Instant) {
+        let wanted = (self.colour)(signal);
+        self.wanted = Some(wanted);
+        if self.shown == Some(wanted) && self.due.is_some_and(|due| now < due) {
+            return;
+        }
+        // Given up half way, it shows what nobody knows.
+        self.shown = None;
+        let [r, g, b] = wanted;
+        if self.writer.write([RGB8 { r, g, b }; N]).await.is_ok() {
+            self.shown = Some(wanted);
+            self.due = Some(now + REFRESH);
+        }
+    }
+}
+
 impl<W: SmartLedsWrite, const N: usize> Indicator for Lights<W, N>
 where
     RGB8: Into<W::Color>,
@@ -106,6 +152,9 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blocking::block_on;
+    use core::pin::pin;
+    use core::task::{Context, Waker};
     use std::vec;
     use std::vec::Vec;
 
@@ -157,5 +206,47 @@ mod tests {
         }
         // The colour, and again at one to four seconds.
         assert_eq!(lights.writer.writes, vec![[RGB8::new(7, 7, 7)]; 5]);
+    }
+
+    #[derive(Default)]
+    struct AsyncChain {
+        writes: Vec<Vec<RGB8>>,
+        never_ends: bool,
+    }
+
+    impl SmartLedsWriteAsync for AsyncChain {
+        type Error = ();
+        type Color = RGB8;
+        async fn write<T: IntoIterator<Item = I>, I: Into<RGB8>>(&mut self, lights: T) -> Result<(), ()> {
+            self.writes.push(lights.into_iter().map(Into::into).collect());
+            if self.never_ends {
+                core::future::pending::<()>().await;
+            }
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_write_that_is_given_up_is_written_again_when_the_unit_works() {
+        let mut lights = Lights::<_, 1>::body(AsyncChain { never_ends: true, ..Default::default() });
+        let signal = Signal { body: [7; 3], ..Default::default() };
+        for millis in 0..3 {
+            let write = pin!(lights.update(&signal, Instant::from_millis(millis)));
+            assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        }
+        assert_eq!(lights.writer.writes.len(), 3);
+        lights.writer.never_ends = false;
+        for millis in 3..5_003 {
+            block_on(lights.update(&signal, Instant::from_millis(millis)));
+        }
+        assert_eq!(lights.writer.writes.len(), 3 + 5, "at once, and then every second");
+        block_on(lights.update(&Signal::default(), Instant::from_millis(5_003)));
+        assert_eq!(lights.writer.writes.last(), Some(&vec![RGB8::new(0, 0, 0)]), "a new colour is not kept waiting");
+        lights.writer.never_ends = true;
+        let write = pin!(lights.update(&signal, Instant::from_millis(5_004)));
+        assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        lights.writer.never_ends = false;
+        block_on(lights.update(&Signal::default(), Instant::from_millis(5_005)));
+        assert_eq!(lights.writer.writes.len(), 3 + 5 + 3, "the old colour again: nobody knows what is shown");
     }
 }
