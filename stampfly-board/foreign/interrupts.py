@@ -1,13 +1,14 @@
 """The ESP32-C6's interrupt controller, which labwired 0.25.0 has not: PLIC_MX at 0x2000_1000.
 
 esp-hal and ESP-IDF enable lines, give them priorities and mask them there (ESP32-C6 technical reference manual, chapter on the
-high-performance CPU, section "Interrupt Controller"); labwired routes sources to lines by other registers, INTPRI at 0x600C_5000, which have no threshold that this
-firmware writes. And the state of the sources, INTMTX_CORE0_INT_STATUS, is never anything but zero there, so that a handler finds
-nothing to handle.
+high-performance CPU, section "Interrupt Controller"); labwired routes sources to lines by other registers, INTPRI at 0x600C_5000,
+which have no threshold that this firmware writes. And the state of the sources, INTMTX_CORE0_INT_STATUS, is never anything but
+zero there, so that a handler finds nothing to handle.
 
-So every few cycles, and at every instruction while a software interrupt asks, this looks at the sources, writes their state where the firmware reads it, and lets the line that PLIC_MX would take
-interrupt the core: by a software interrupt that the firmware does not use, and by labwired's own route, for as long as one instruction
-takes. A core whose interrupts are off is not interrupted by that.
+So every few cycles, and at every instruction while a software interrupt asks, this looks at the sources, writes their state where
+the firmware reads it, and lets the line that PLIC_MX would take interrupt the core: by a software interrupt that the firmware does
+not use, and by labwired's own route, for as long as one instruction takes. A core whose interrupts are off is not interrupted by
+that.
 """
 
 import struct

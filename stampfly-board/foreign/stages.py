@@ -27,7 +27,7 @@ GOOD = "self test: every bit as recorded"
 # The row of `control` in the activation table, `stampfly-board/src/schedule.rs`, which has so many.
 CONTROL, ACTIVATIONS = 5, 12
 SENSORS = ["imu", "flow", "tof", "tof_front", "mag", "baro", "power"]
-# Without an inertial sensor the flight band runs every 10 ms. Lights that never end are to be written several times by then.
+# Without an inertial sensor the flight band runs every 10 ms. The first light is written after five to eight of them.
 PASSES = 50
 # Timer group 1, by its number in the interrupt matrix.
 CUT_OFF = 54

@@ -226,13 +226,18 @@ mod tests {
         }
     }
 
+    /// Begins an update and gives it up.
+    fn give_up(lights: &mut Lights<AsyncChain, 1>, signal: &Signal, now: Instant) {
+        let write = pin!(lights.update(signal, now));
+        assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());
+    }
+
     #[test]
     fn a_write_that_is_given_up_is_written_again_when_the_unit_works() {
         let mut lights = Lights::<_, 1>::body(AsyncChain { never_ends: true, ..Default::default() });
         let signal = Signal { body: [7; 3], ..Default::default() };
         for millis in 0..3 {
-            let write = pin!(lights.update(&signal, Instant::from_millis(millis)));
-            assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());
+            give_up(&mut lights, &signal, Instant::from_millis(millis));
         }
         assert_eq!(lights.writer.writes.len(), 3);
         lights.writer.never_ends = false;
@@ -243,8 +248,7 @@ mod tests {
         block_on(lights.update(&Signal::default(), Instant::from_millis(5_003)));
         assert_eq!(lights.writer.writes.last(), Some(&vec![RGB8::new(0, 0, 0)]), "a new colour is not kept waiting");
         lights.writer.never_ends = true;
-        let write = pin!(lights.update(&signal, Instant::from_millis(5_004)));
-        assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());
+        give_up(&mut lights, &signal, Instant::from_millis(5_004));
         lights.writer.never_ends = false;
         block_on(lights.update(&Signal::default(), Instant::from_millis(5_005)));
         assert_eq!(lights.writer.writes.len(), 3 + 5 + 3, "the old colour again: nobody knows what is shown");
