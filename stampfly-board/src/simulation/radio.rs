@@ -67,6 +67,11 @@ impl<'b> Radio<'b> {
         }
     }
 
+    /// Whether frames get through now.
+    pub(super) fn is_open(&mut self) -> bool {
+        self.telemetry.pass(self.clock.now(), &self.frame).is_some()
+    }
+
     /// Virtual time.
     #[must_use]
     pub fn clock(&self) -> &Clock {

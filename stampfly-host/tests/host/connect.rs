@@ -19,10 +19,15 @@ pub fn connect(folder: &Path, place: &str, more: &[&str]) -> (Program, WebSocket
     let ports = ["--port", "http=0", "--port", "others=off"];
     let arguments = [&["connect", place][..], &ports, more].concat();
     let mut program = Program::start(folder, &arguments);
-    let address: SocketAddr = program.said("http ", "http://").parse().expect("an address");
+    let socket = page(&program.said("http ", "http://"));
+    (program, socket)
+}
+
+/// A page's socket at that address.
+pub fn page(address: &str) -> WebSocket<TcpStream> {
     let stream = TcpStream::connect(address).expect("it listens");
     stream.set_read_timeout(Some(SOON)).expect("a timeout");
-    (program, tungstenite::client(format!("ws://{address}/ws"), stream).expect("a handshake").0)
+    tungstenite::client(format!("ws://{address}/ws"), stream).expect("a handshake").0
 }
 
 /// The next text of this kind that is as wanted.

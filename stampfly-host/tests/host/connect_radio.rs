@@ -1,6 +1,6 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
-use crate::connect::{alive, ask, connect, is_done, is_up, next, passes, rate, recorded, sample};
+use crate::connect::{alive, ask, connect, is_done, is_up, next, page, passes, rate, recorded, sample};
 use crate::program::{Program, folder};
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -206,6 +206,23 @@ fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
     // It falls, and is there for its page.
     assert!(is_at(&mut socket, down, -0.1..0.1, SOON));
     is_done(&mut socket, 11, "status", "CRASHED");
+}
+
+#[test]
+fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
+    let folder = folder("connect", "sealed_silent");
+    let ours = key(&folder, "ours", 1);
+    let ports = ["serve", "--port", "others=off", "--port", "http=0", "--port", "sealed=0", "--key", &ours];
+    let mut serving = Program::start(&folder, &ports);
+    let vehicle = serving.said("sealed", "listening on ");
+    let mut beside = page(&serving.said("http ", "http://"));
+    let (_connected, mut socket) = connect(&folder, &format!("udp:{vehicle}"), &["--key", &ours]);
+    next(&mut socket, "event", is_up(true));
+    let fault = ask(&mut beside, 1, json!({ "do": "fault", "text": "link-lost@0+4" }));
+    assert_eq!(fault["ok"], json!(true), "{fault}");
+    next(&mut socket, "event", is_up(false));
+    next(&mut socket, "event", is_up(true));
+    passes(&mut socket, 2);
 }
 
 #[test]

@@ -56,7 +56,8 @@ impl Program {
 
     /// What it says behind this word, to the next white space.
     pub fn said(&mut self, line: &str, word: &str) -> String {
-        let lines = BufReader::new(self.0.stdout.as_mut().expect("a pipe")).lines().map_while(Result::ok);
+        // A byte at a time: what is read ahead is lost for whoever asks next.
+        let lines = BufReader::with_capacity(1, self.0.stdout.as_mut().expect("a pipe")).lines().map_while(Result::ok);
         for said in lines {
             if let Some((_, rest)) = said.split_once(word).filter(|_| said.starts_with(line)) {
                 return rest.split_whitespace().next().unwrap_or_default().to_owned();

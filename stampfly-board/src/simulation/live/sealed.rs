@@ -40,6 +40,9 @@ impl Sealed {
 
     /// Takes what has come.
     pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>) {
+        if !controls.hands.radio.is_open() {
+            return;
+        }
         let (SocketAddr::V4(place), Some(link)) = (from.address, controls.hands.radio.link()) else { return };
         let source = self.routes.source(now, place, link.guarded.station());
         let mut room = [0; MAX_FRAME];
@@ -56,9 +59,14 @@ impl Sealed {
     /// Sends what is due. Call it every 20 ms.
     pub fn poll(&mut self, now: Instant, controls: &mut Controls<'_>, desk: &Desk<'_>, put: Put<'_>) {
         let Board { radio, console, config, seen, .. } = &mut controls.hands;
+        let is_open = radio.is_open();
         let Some(link) = radio.link() else { return };
         let Self { routes, desk: asked } = self;
         let mut send = |to: Address, frame: &[u8]| {
+            // The vehicle does not know that nobody hears it.
+            if !is_open {
+                return;
+            }
             let mut send = |place: SocketAddrV4| put(&Client { port: SEALED, address: place.into() }, frame);
             if to == Address::BROADCAST {
                 routes.recent(now).for_each(send);
