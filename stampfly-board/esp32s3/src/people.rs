@@ -47,7 +47,9 @@ pub async fn run(parts: Box<Parts>) {
     let body: Chain<{ buffer_size::<RGB8>(2) }> =
         Chain::new_with_memsize(WS2812B_TIMING, pulses.channel1, pins.body_lights, 2, PULSE_CLOCK)
             .expect("possible pulses");
-    let (mut status, mut body) = (Lights::<_, 1>::status(status), Lights::<_, 2>::body(body));
+    // On the heap: static memory is the stack's, and what a task keeps is static.
+    let mut status = Box::new(Lights::<_, 1>::status(status));
+    let mut body = Box::new(Lights::<_, 2>::body(body));
     let mut buzzer = Buzzer::new(Channel::new(pins.buzzer.into()));
     let mut contact = PinButton(Input::new(pins.button, InputConfig::default().with_pull(Pull::Up)));
     // The buzzer wants to be asked twice as often as the button.
@@ -58,13 +60,16 @@ pub async fn run(parts: Box<Parts>) {
         if look {
             button.button_contact.publish(now, &ButtonContact { pressed: contact.is_pressed() });
         }
-        if let Some(sample) = indicator.signal.latest() {
-            // What is given up is written again the next time.
-            let _ = with_timeout(LONGEST_WRITE, status.update(&sample.data, now)).await;
-            let _ = with_timeout(LONGEST_WRITE, body.update(&sample.data, now)).await;
-            buzzer.show(&sample.data);
+        let signal = indicator.signal.latest().map(|sample| sample.data);
+        if let Some(signal) = &signal {
+            buzzer.show(signal);
         }
         // A buzzer that refuses is tried again the next time.
         let _ = buzzer.step(now);
+        // What is given up is written again the next time.
+        if let Some(signal) = signal {
+            let _ = with_timeout(LONGEST_WRITE, status.update(&signal, now)).await;
+            let _ = with_timeout(LONGEST_WRITE, body.update(&signal, now)).await;
+        }
     }
 }

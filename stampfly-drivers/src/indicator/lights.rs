@@ -121,18 +121,22 @@ where
     /// block_on(body.update(&signal, Instant::from_secs(5)));
     /// assert_eq!(body.writer().0, [RGB8::new(32, 0, 32); 2]);
     /// ```
-    pub async fn update(&mut self, signal: &Signal, now: Instant) {
+    pub fn update(&mut self, signal: &Signal, now: Instant) -> impl Future<Output = ()> {
         let wanted = (self.colour)(signal);
         self.wanted = Some(wanted);
-        if self.shown == Some(wanted) && self.due.is_some_and(|due| now < due) {
-            return;
-        }
-        // Given up half way, it shows what nobody knows.
-        self.shown = None;
-        let [r, g, b] = wanted;
-        if self.writer.write([RGB8 { r, g, b }; N]).await.is_ok() {
-            self.shown = Some(wanted);
-            self.due = Some(now + REFRESH);
+        let is_due = self.shown != Some(wanted) || self.due.is_none_or(|due| now >= due);
+        // Not an async function, which would keep its arguments for as long as a write takes.
+        async move {
+            if !is_due {
+                return;
+            }
+            // Given up half way, it shows what nobody knows.
+            self.shown = None;
+            let [r, g, b] = wanted;
+            if self.writer.write([RGB8 { r, g, b }; N]).await.is_ok() {
+                self.shown = Some(wanted);
+                self.due = Some(now + REFRESH);
+            }
         }
     }
 }
