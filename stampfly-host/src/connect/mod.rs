@@ -13,6 +13,7 @@
 //! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables pulled out. Pages are told.
 
 mod log;
+mod orders;
 mod place;
 mod questions;
 mod record;

@@ -2,13 +2,14 @@
 //!
 //! An envelope has the number of the question that it asks or answers, and the fingerprint of the tables. On the secure link an acknowledgement names a command's number or a
 //! frame's counter, a parameter its place, a part of an answer its line, and the fingerprint comes by itself once a second. Nothing that depends on the vehicle's tables
-//! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again until it is answered, by [`Commands`] and
+//! passes before it is known, and with other tables than the station's nothing but a kill does. What a cable does not lose is said again until it is answered, by [`Orders`] and
 //! [`Questions`]. No socket, no clock, no key.
 
-use super::questions::{Questions, Send, remember};
+use super::orders::Orders;
+use super::questions::{Questions, Send};
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
-use stampfly_link::secure::{Commands, Payload};
+use stampfly_link::secure::Payload;
 use stampfly_services::cable::{Assembly, Envelope, TYPE};
 use stampfly_types::Instant;
 use stampfly_types::messages::GuidedKind;
@@ -39,9 +40,7 @@ pub(super) struct Translation {
     tables: Tables,
     /// The number of the newest command or line, not that of the question: a station's signs of life are counted there as well, and come round.
     counted: u32,
-    commands: Commands,
-    /// Numbers of commands and of the questions that they are.
-    asked: VecDeque<(u32, u16)>,
+    orders: Orders,
     questions: Questions,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
@@ -57,8 +56,7 @@ impl Translation {
             ours: 0,
             tables: Tables::Unknown,
             counted: first,
-            commands: Commands::new(),
-            asked: VecDeque::new(),
+            orders: Orders::default(),
             questions: Questions::default(),
             frames: VecDeque::new(),
         }
@@ -83,18 +81,14 @@ impl Translation {
                 continue;
             }
             self.counted = self.counted.wrapping_add(1);
-            // The station knows by itself what is not answered.
-            while self.commands.over(now).is_some() {}
             // What says nothing but that somebody is there comes again anyway.
             if let Some(command) = payload.command().filter(|command| command.kind != GuidedKind::None) {
-                if self.commands.say(now, self.counted, command) {
-                    remember(&mut self.asked, (self.counted, number));
-                } else {
+                if !self.orders.say(now, self.counted, number, command) {
                     put(&mut self.writer, &mut self.frames, table, number, &REFUSED);
                 }
             } else if !self.questions.ask(now, number, self.counted, &payload) {
                 if payload.is_kill() {
-                    self.commands.end(now);
+                    self.orders.end(now);
                 }
                 send(&payload);
             }
@@ -104,10 +98,9 @@ impl Translation {
 
     /// Says what is due to be said, for the first time or again. Call it every 20 ms.
     pub fn poll(&mut self, now: Instant, send: Send<'_>) {
-        if let Some(payload) = self.commands.next(now) {
+        if let Some(payload) = self.orders.next(now) {
             send(&payload);
         }
-        while self.commands.over(now).is_some() {}
         self.questions.poll(now, send);
     }
 
@@ -125,24 +118,22 @@ impl Translation {
             // It is said again.
             return;
         }
-        let (number, payload) = match *payload {
+        let (numbers, payload) = match *payload {
             Payload::Acknowledgement { counter, taken } => {
-                let number = if self.commands.acknowledge(counter, taken) {
-                    self.asked.iter().find(|(number, _)| *number == counter).map(|(_, question)| *question)
-                } else if taken {
-                    None
-                } else {
-                    self.questions.refused(counter)
-                };
-                (number, *payload)
+                let mut numbers = self.orders.acknowledge(counter, taken);
+                if !taken {
+                    numbers.extend(self.questions.refused(counter));
+                }
+                (numbers, *payload)
             }
             Payload::Parameter { index, value, taken } => {
-                (Some(self.questions.parameter(index, value, taken)), *payload)
+                (vec![self.questions.parameter(index, value, taken)], *payload)
             }
             Payload::Part { number, from, text, last } => {
-                (self.questions.part(now, number, from, text, last), Payload::Reply { text, last })
+                let numbers = self.questions.part(now, number, from, text, last).into_iter().collect();
+                (numbers, Payload::Reply { text, last })
             }
-            _ => (Some(0), *payload),
+            _ => (vec![0], *payload),
         };
         let table = match (self.tables, payload) {
             // The station sees the fingerprint, and nothing else.
@@ -150,7 +141,7 @@ impl Translation {
             (Tables::Ours, _) => self.ours,
             _ => return,
         };
-        if let Some(number) = number {
+        for number in numbers {
             put(&mut self.writer, &mut self.frames, table, number, &payload);
         }
     }
@@ -232,13 +223,17 @@ mod tests {
         }
 
         fn read(&mut self) -> Option<(u16, u16, String)> {
+            self.read_all().pop()
+        }
+
+        fn read_all(&mut self) -> Vec<(u16, u16, String)> {
             let (mut decoder, mut assembly) = (MavlinkDecoder::<MavMessage>::new(), Assembly::default());
             let bytes: Vec<u8> = self.translation.frames.drain(..).collect();
-            let mut read = None;
+            let mut read = Vec::new();
             for byte in bytes {
                 let tunnel = decoder.feed(byte).and_then(|frame| Tunnel::read(frame.payload));
                 if let Some((envelope, payload)) = tunnel.as_ref().and_then(|tunnel| assembly.feed(&tunnel.bytes)) {
-                    read = Some((envelope.table, envelope.number, format!("{payload:?}")));
+                    read.push((envelope.table, envelope.number, format!("{payload:?}")));
                 }
             }
             read
@@ -375,6 +370,27 @@ mod tests {
         line.sent.clear();
         line.pass(1_000);
         assert_eq!(line.sent.len(), 0);
+    }
+
+    #[test]
+    fn a_kill_in_the_place_of_a_kill_answers_both_and_one_that_came_to_nothing_none() {
+        let mut line = Line::to(OURS);
+        line.say(2, &guided(GuidedKind::Kill));
+        line.pass(1_000);
+        line.say(3, &Payload::Kill);
+        line.pass(1_500);
+        let (first, second) = (FIRST.wrapping_add(2), FIRST.wrapping_add(3));
+        assert_eq!(line.hear(&acknowledgement(first, true)), None, "it has been replaced");
+        line.translation.hear(line.now, &acknowledgement(second, true));
+        let answered = [read(&acknowledgement(second, true), 2), read(&acknowledgement(second, true), 3)];
+        assert_eq!(line.read_all(), answered.map(Option::unwrap));
+        assert_eq!(line.hear(&acknowledgement(second, true)), None);
+
+        line.say(4, &guided(GuidedKind::Kill));
+        line.pass(2_000);
+        line.say(5, &guided(GuidedKind::Kill));
+        let third = acknowledgement(FIRST.wrapping_add(5), true);
+        assert_eq!(line.hear(&third), read(&third, 5));
     }
 
     #[test]

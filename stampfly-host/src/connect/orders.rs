@@ -1,0 +1,73 @@
+//! Commands to a vehicle on the secure link, and the questions of pages that they answer.
+//!
+//! [`Commands`] says them until they are acknowledged; this remembers who asked. A kill takes the place of a kill, and then answers both. No socket, no clock,
+//! no key.
+
+use super::questions::remember;
+use stampfly_link::secure::{Commands, Payload};
+use stampfly_types::Instant;
+use stampfly_types::messages::{GuidedCommand, GuidedKind};
+use std::collections::VecDeque;
+
+/// Commands on their way to one vehicle.
+#[derive(Debug, Default)]
+pub(super) struct Orders {
+    commands: Commands,
+    /// Numbers of commands and of the questions that they are.
+    asked: VecDeque<(u32, u16)>,
+    /// The number of the kill that is being said.
+    kill: Option<u32>,
+}
+
+impl Orders {
+    /// Takes a command. `false` when there is no room.
+    pub fn say(&mut self, now: Instant, number: u32, question: u16, command: GuidedCommand) -> bool {
+        // Before anything is said: what is over takes its room.
+        self.forget(now);
+        if !self.commands.say(now, number, command) {
+            return false;
+        }
+        if command.kind == GuidedKind::Kill
+            && let Some(before) = self.kill.replace(number)
+        {
+            for (asked, _) in self.asked.iter_mut().filter(|(asked, _)| *asked == before) {
+                *asked = number;
+            }
+        }
+        remember(&mut self.asked, (number, question));
+        true
+    }
+
+    /// What is to be sent now. Call it every 20 ms.
+    pub fn next(&mut self, now: Instant) -> Option<Payload<'static>> {
+        let next = self.commands.next(now);
+        self.forget(now);
+        next
+    }
+
+    /// Somebody has killed the vehicle otherwise than with a command.
+    pub fn end(&mut self, now: Instant) {
+        self.commands.end(now);
+    }
+
+    /// The questions that this acknowledgement answers.
+    pub fn acknowledge(&mut self, number: u32, taken: bool) -> Vec<u16> {
+        if self.commands.acknowledge(number, taken) { self.take(number) } else { Vec::new() }
+    }
+
+    /// Forgets commands that nobody answers any more. A station knows by itself what is not answered.
+    fn forget(&mut self, now: Instant) {
+        while let Some(over) = self.commands.over(now) {
+            self.take(over);
+        }
+    }
+
+    /// Takes the questions of a command that is done with.
+    fn take(&mut self, command: u32) -> Vec<u16> {
+        self.kill = self.kill.filter(|kill| *kill != command);
+        let questions = self.asked.iter().filter(|(asked, _)| *asked == command).map(|(_, question)| *question);
+        let questions = questions.collect();
+        self.asked.retain(|(asked, _)| *asked != command);
+        questions
+    }
+}
