@@ -23,6 +23,7 @@ SOURCES = {
     22: (FROM_CPU, 1),
     23: (FROM_CPU + 4, 1),
     48: (0x6000_F00C, 0xFFFF),  # USB serial
+    49: (0x6000_603C, 0xFFFF),  # the lights' pulses, `lights.py`
     50: (0x6000_402C, 0x3_FFFF),  # I2C
     51: (0x6000_8078, 1),  # timer group 0: the executor's alarms
     54: (0x6000_9078, 1),  # timer group 1: the cut-off
@@ -41,8 +42,11 @@ PATIENCE = 16
 
 
 class Interrupts:
-    def __init__(self, sim):
+    """The controller, and units that it moves on before it looks at them."""
+
+    def __init__(self, sim, *units):
         self.sim = sim
+        self.units = units
         self.slow = self.shown = self.chunks = 0
         self.offered: dict[int, int] = {}
 
@@ -53,7 +57,7 @@ class Interrupts:
             self.chunks += 1
             # What asked a moment ago may have been answered since: a handler that is called for nothing clears what comes next.
             if self.slow or self.chunks % PATIENCE == 0:
-                self.slow = self._asking(SLOW)
+                self.slow = self._units()
             if self._look():
                 self._exchange()
             elif self.slow:
@@ -66,7 +70,7 @@ class Interrupts:
         might find nothing to do, and would say so when it is continued, whatever has come meanwhile.
         """
         for _ in range(SOON):
-            self.slow = self._asking(SLOW)
+            self.slow = self._units()
             quick = self._look()
             if not quick:
                 return
@@ -84,6 +88,12 @@ class Interrupts:
             for word in range(3):
                 self.sim.write_u32(STATUS + 4 * word, self.shown >> 32 * word & 0xFFFF_FFFF)
         return quick
+
+    def _units(self) -> int:
+        """Which sources other than the software interrupts ask."""
+        for unit in self.units:
+            unit.poll()
+        return self._asking(SLOW)
 
     def _asking(self, numbers: tuple[int, ...]) -> int:
         asking = 0

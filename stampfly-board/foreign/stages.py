@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from interrupts import Interrupts
+from lights import Pulses
 from machine import Board
 from program import Program
 
@@ -27,8 +28,10 @@ GOOD = "self test: every bit as recorded"
 # The row of `control` in the activation table, `stampfly-board/src/schedule.rs`, which has so many.
 CONTROL, ACTIVATIONS = 5, 12
 SENSORS = ["imu", "flow", "tof", "tof_front", "mag", "baro", "power"]
-# Without an inertial sensor the flight band runs every 10 ms. The first light is written after five to eight of them.
+# Without an inertial sensor the flight band runs every 10 ms. The lights are first written after five to eight of them, and do not end.
 PASSES = 50
+# What the lights show of a vehicle without an inertial sensor (`stampfly-mode/src/signal.rs`).
+RED, WHITE = [(32, 0, 0)], [(32, 32, 32)] * 2
 # Timer group 1, by its number in the interrupt matrix.
 CUT_OFF = 54
 MILLION = 1_000_000
@@ -107,7 +110,8 @@ class Flying:
 
     def __init__(self, board: Board, program: Program, interrupts=Interrupts):
         self.board = board
-        self.interrupts = interrupts(board.sim)
+        self.pulses = Pulses(board.sim)
+        self.interrupts = interrupts(board.sim, self.pulses)
         self.profile, size = program.symbol("start07PROFILE")
         expect(size == 8 + 32 * ACTIVATIONS, "the table of the run times is not as large as it was")
         self.health, size = program.symbol("start06HEALTH")
@@ -208,6 +212,11 @@ def firmware(program: Program, rom: Program):
     offers = flying.interrupts.offered.get(CUT_OFF, 0)
     expect(offers > PASSES, f"the cut-off's timer has asked {offers} times only")
     reached(f"{flying.passes()} control passes, motors still; the cut-off's timer has asked {offers} times")
+    status, body = flying.pulses.written
+    expect(not status and not body, "lights that never end are seen")
+    flying.pulses.works = True
+    expect(flying.run(20 * PASSES, lambda: RED in status and WHITE in body), f"the lights show {status} and {body}")
+    reached("the status light is red and the body's are white, now that pulses end")
     say(f"sensors (samples, errors, kind of the last): {flying.sensors()}")
     said = board.sim.uart_transcript()
     expect("panicked" not in said, said)
