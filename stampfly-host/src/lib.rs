@@ -31,6 +31,7 @@ mod page;
 pub mod report;
 pub mod serve;
 pub mod vehicles;
+mod waited;
 
 pub use report::Report;
 /// The log of a flight.

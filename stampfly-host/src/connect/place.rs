@@ -1,5 +1,6 @@
 //! Where a vehicle's line is: a serial port of this computer, or a TCP port that carries one.
 
+use crate::waited::has_only_waited;
 use serialport::{SerialPort, SerialPortBuilder};
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -141,11 +142,7 @@ impl Line {
             // A connection that was closed, a device that was pulled out.
             Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
             // A signal is no fault of the line's.
-            Err(error)
-                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
-            {
-                Ok(0)
-            }
+            Err(error) if has_only_waited(&error) => Ok(0),
             other => other,
         }
     }

@@ -1,6 +1,7 @@
 //! The vehicle's console over a serial port: a line is typed, the answer is what comes up to the next prompt.
 
 use super::visit::Lost;
+use crate::waited::has_only_waited;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -92,7 +93,7 @@ impl Port for Serial {
         let mut bytes = [0; 1024];
         match self.port.read(&mut bytes) {
             Ok(count) => Ok(String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()).into_owned()),
-            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(String::new()),
+            Err(error) if has_only_waited(&error) => Ok(String::new()),
             Err(error) => Err(io::Error::new(error.kind(), format!("{}: {error}", self.path))),
         }
     }
@@ -107,7 +108,7 @@ impl stampfly_sim::vehicle::Port for Serial {
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
         self.port.set_timeout(patience.min(PATIENCE))?;
         match self.port.read(buffer) {
-            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
+            Err(error) if has_only_waited(&error) => Ok(0),
             other => other,
         }
     }

@@ -5,6 +5,7 @@
 //! nothing for too long is cut off.
 
 use super::limits::Limits;
+use crate::waited::has_only_waited;
 use stampfly_ground::Feed;
 use stampfly_ground::ask::{AskError, Asked, Incoming, Reply};
 use stampfly_ground::{Connection, Hub};
@@ -54,9 +55,9 @@ fn period(rate: u8) -> Duration {
     Duration::from_secs(1) / u32::from(rate.max(1))
 }
 
-/// Was it only not possible now? Systems name it differently.
+/// Was it only not possible now?
 fn is_full(error: &Error) -> bool {
-    matches!(error, Error::Io(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+    matches!(error, Error::Io(error) if has_only_waited(error))
 }
 
 impl Page {

@@ -6,6 +6,7 @@
 use super::client;
 use super::limits::Limits;
 use super::page;
+use crate::waited::has_only_waited;
 use stampfly_ground::Hub;
 use stampfly_ground::http::{self, Hosts, Refusal, Request, Wanted};
 use std::io::{self, ErrorKind, Read, Write};
@@ -165,7 +166,7 @@ fn read_request(common: &Common, stream: &mut TcpStream, bytes: &mut Vec<u8>) ->
         let length = match stream.read(&mut part) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(length) => length,
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => continue,
+            Err(error) if has_only_waited(&error) => continue,
             Err(error) => return Err(error),
         };
         bytes.extend_from_slice(part.get(..length).unwrap_or_default());

@@ -2,9 +2,10 @@
 //! and the writer, so that nobody who reads slowly can hold up a flight.
 
 use super::events::{Events, POLL};
+use crate::waited::has_only_waited;
 use stampfly_sim::vehicle::{Client, Heard};
 use std::collections::HashMap;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -98,7 +99,7 @@ fn read(mut stream: TcpStream, client: Client, connections: &Connections, events
             Ok(0) => break,
             // Waits while the flight has much to hear: the sender is held up, not the flight.
             Ok(length) => events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default())),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(error) if has_only_waited(&error) => {}
             Err(_) => break,
         }
     }

@@ -3,6 +3,7 @@
 //! A vehicle would stream it the same way: what sends has a ring and a [`Streamer`](stampfly_flight::compact::Streamer), what receives
 //! writes chunks behind each other. [`receive`] is that end here.
 
+use crate::waited::has_only_waited;
 use stampfly_bus::Schedule;
 use stampfly_flight::Observer;
 use stampfly_flight::compact::{MAGIC, Receiver};
@@ -104,7 +105,7 @@ pub fn receive(socket: &UdpSocket, file: &mut impl Write, limit: Duration) -> io
                     write_chunk(file, chunk)?;
                 }
             }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(error) if has_only_waited(&error) => {}
             // A datagram of ours was refused where it went to.
             Err(error) if error.kind() == ErrorKind::ConnectionReset => {}
             Err(error) => return Err(error),

@@ -12,6 +12,7 @@ use std::sync::Arc;
 /// Opens one, and returns its name.
 #[cfg(unix)]
 pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Events) -> io::Result<String> {
+    use crate::waited::has_only_waited;
     use serialport::{SerialPort as _, TTYPort};
     use std::io::{ErrorKind, Read, Write};
 
@@ -36,7 +37,7 @@ pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Even
         while events.are_open() {
             match ours.read(&mut part) {
                 Ok(length) => events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default())),
-                Err(error) if error.kind() == ErrorKind::TimedOut => {}
+                Err(error) if has_only_waited(&error) => {}
                 Err(_) => break,
             }
         }

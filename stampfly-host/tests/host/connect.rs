@@ -2,6 +2,7 @@
 
 use crate::program::{Program, folder};
 use serde_json::{Value, json};
+use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Command;
@@ -34,7 +35,12 @@ pub fn page(address: &str) -> WebSocket<TcpStream> {
 pub fn next(socket: &mut WebSocket<TcpStream>, kind: &str, is_wanted: impl Fn(&Value) -> bool) -> Value {
     let until = Instant::now() + SOON;
     while Instant::now() < until {
-        let Message::Text(text) = socket.read().expect("a message") else { continue };
+        let message = match socket.read() {
+            // A machine that was held for a moment.
+            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => continue,
+            message => message.expect("a message"),
+        };
+        let Message::Text(text) = message else { continue };
         let value: Value = serde_json::from_str(&text).expect("JSON");
         if !value[kind].is_null() && is_wanted(&value[kind]) {
             return value[kind].clone();
@@ -210,4 +216,29 @@ fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_
     assert_eq!(code(&["tcp:nowhere"]), Some(2));
     assert_eq!(code(&["/dev/null", "--baud", "12"]), Some(2));
     assert_eq!(code(&["/dev/null", "--port", "tello=1"]), Some(1), "as of serve");
+}
+
+/// Sends a signal to a program.
+#[cfg(unix)]
+fn signal(Program(process): &Program, name: &str) {
+    let sent = Command::new("kill").args([name, &process.id().to_string()]).status();
+    assert!(sent.expect("kill").success());
+}
+
+#[test]
+#[cfg(unix)]
+fn a_computer_that_sleeps_for_a_moment_loses_neither_the_line_nor_the_page() {
+    let folder = folder("connect", "sleep");
+    let (serving, place) = vehicle(&folder, 0);
+    let (connected, mut socket) = connect(&folder, &format!("tcp:{place}"), &[]);
+    next(&mut socket, "event", is_up(true));
+    for _ in 0..3 {
+        for name in ["-STOP", "-CONT"] {
+            signal(&serving, name);
+            signal(&connected, name);
+            std::thread::sleep(Duration::from_millis(200));
+        }
+    }
+    let read = ask(&mut socket, 2, json!({ "do": "param_get", "name": "eskf.gate" }));
+    assert_eq!((&read["ok"], &read["value"]), (&json!(true), &json!(4.0)));
 }

@@ -7,7 +7,7 @@ use stampfly_host::ground::{Event, Hub, Limits, Reply, Server, VehicleCard, ask:
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Instant, Message as _};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant as Wall};
@@ -52,9 +52,14 @@ fn socket(address: SocketAddr) -> WebSocket<TcpStream> {
 fn next(socket: &mut WebSocket<TcpStream>, kind: &str) -> Value {
     let until = Wall::now() + SOON;
     while Wall::now() < until {
-        let text = match socket.read().expect("a message") {
-            Message::Text(text) => text,
-            _ => continue,
+        let text = match socket.read() {
+            Ok(Message::Text(text)) => text,
+            // A machine that was held for a moment.
+            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => continue,
+            other => {
+                other.expect("a message");
+                continue;
+            }
         };
         let value: Value = serde_json::from_str(&text).expect("JSON");
         if !value[kind].is_null() {
