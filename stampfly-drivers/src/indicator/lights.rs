@@ -123,7 +123,6 @@ where
     /// ```
     pub fn update(&mut self, signal: &Signal, now: Instant) -> impl Future<Output = ()> {
         let wanted = (self.colour)(signal);
-        self.wanted = Some(wanted);
         let is_due = self.shown != Some(wanted) || self.due.is_none_or(|due| now >= due);
         // Not an async function, which would keep its arguments for as long as a write takes.
         async move {
