@@ -31,16 +31,21 @@ pub fn page(address: &str) -> WebSocket<TcpStream> {
     tungstenite::client(format!("ws://{address}/ws"), stream).expect("a handshake").0
 }
 
+/// The next message, also on a machine that was held for a moment.
+pub fn message(socket: &mut WebSocket<TcpStream>) -> Message {
+    loop {
+        match socket.read() {
+            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
+            message => return message.expect("a message"),
+        }
+    }
+}
+
 /// The next text of this kind that is as wanted.
 pub fn next(socket: &mut WebSocket<TcpStream>, kind: &str, is_wanted: impl Fn(&Value) -> bool) -> Value {
     let until = Instant::now() + SOON;
     while Instant::now() < until {
-        let message = match socket.read() {
-            // A machine that was held for a moment.
-            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => continue,
-            message => message.expect("a message"),
-        };
-        let Message::Text(text) = message else { continue };
+        let Message::Text(text) = message(socket) else { continue };
         let value: Value = serde_json::from_str(&text).expect("JSON");
         if !value[kind].is_null() && is_wanted(&value[kind]) {
             return value[kind].clone();

@@ -1,5 +1,6 @@
 //! The ground station's server over the loopback network: raw bytes, and WebSocket clients.
 
+use crate::connect::{message, page};
 use serde_json::{Value, json};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::topics::Id;
@@ -7,7 +8,7 @@ use stampfly_host::ground::{Event, Hub, Limits, Reply, Server, VehicleCard, ask:
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Instant, Message as _};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant as Wall};
@@ -45,22 +46,13 @@ fn get(address: SocketAddr, path: &str) -> String {
 }
 
 fn socket(address: SocketAddr) -> WebSocket<TcpStream> {
-    let stream = connect(address);
-    tungstenite::client(format!("ws://{address}/ws"), stream).expect("a handshake").0
+    page(&address.to_string())
 }
 
 fn next(socket: &mut WebSocket<TcpStream>, kind: &str) -> Value {
     let until = Wall::now() + SOON;
     while Wall::now() < until {
-        let text = match socket.read() {
-            Ok(Message::Text(text)) => text,
-            // A machine that was held for a moment.
-            Err(tungstenite::Error::Io(error)) if error.kind() == ErrorKind::Interrupted => continue,
-            other => {
-                other.expect("a message");
-                continue;
-            }
-        };
+        let Message::Text(text) = message(socket) else { continue };
         let value: Value = serde_json::from_str(&text).expect("JSON");
         if !value[kind].is_null() {
             return value[kind].clone();
