@@ -1,4 +1,4 @@
-//! Every check of this repository: `cargo xtask STEP`, `cargo xtask ci` for all of them.
+//! Every check of this repository: `cargo xtask STEP`; `cargo xtask ci` for those of a push, `cargo xtask nightly` for the others.
 //!
 //! [`STEPS`] is the list; one file per step is in [`steps`]. A step prints the commands it runs to stderr and fails with a
 //! sentence. Exit code: 0 passed, 1 failed, 2 wrong command line.
@@ -6,13 +6,12 @@
 mod arguments;
 mod cargo_tool;
 mod changelog;
-mod ci;
 mod commit;
 mod copy;
 mod elf;
 mod front_page;
+mod lane;
 mod machine;
-mod modules;
 mod mutation;
 mod page;
 mod ratchet;
@@ -24,126 +23,137 @@ mod steps;
 use arguments::Accepts::{Debian, File, Fix, Rest, Seconds};
 use repository::Repository;
 use std::process::ExitCode;
-use step::Step;
+use step::Holds::{Debug, Esp32, Machine, Qemu, Release};
+use step::{Chosen, Step};
 
-/// In the order of `ci`: fast and frequent failures first. `foreign`, `panic-calls` and `memory` look at what
-/// `esp32` has built.
+/// In the order in which a lane starts them. A step that builds what others use, or that takes long, comes early.
 const STEPS: &[Step] = &[
-    Step::new("machine", "List the missing programs that the steps need", steps::machine::run),
-    Step::new("fmt", "Check the formatting", steps::fmt::run),
-    Step::new("files", "Find dependency cycles between source files", steps::files::run),
-    Step::new("constants", "Find constants of the StampFly in generic crates", steps::constants::run),
-    Step::new("lines", "Count the lines of the vehicles", steps::lines::run),
-    Step::new("clippy", "Lint every target; a warning fails", steps::clippy::run),
-    Step::new("test", "Run `cargo test`, on recorded data as well", steps::test::run).accepting(&[Rest]),
-    Step::new("examples", "Run every example to its end", steps::examples::run),
-    Step::new("doc", "Build the documentation; a warning fails", steps::doc::run),
-    Step::new("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
-    Step::new("hals", "Build the drivers' examples for Linux, RP2350, STM32 and ESP32", steps::hals::run)
-        .beside()
-        .accepting(&[Debian]),
-    Step::new("stm32", "Build the STM32 quadcopter's firmware, hold it to flash and memory", steps::stm32::run)
-        .beside()
-        .accepting(&[Debian]),
-    Step::new("features", "Check each library with each of its features alone", steps::features::run).beside(),
-    Step::new("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run).beside(),
-    Step::new("loom", "Run the bus's loom models in every interleaving", steps::loom::run).beside().accepting(&[Rest]),
-    Step::new("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run),
-    Step::new(
-        "search",
-        "Search with libFuzzer and the address sanitizer, each target for SECONDS (20)",
-        steps::search::run,
+    // For every push.
+    Step::ci("machine", "List the missing programs that the steps need", steps::machine::run),
+    Step::ci("program", "Build the program `stampfly` that other steps run", steps::program::run).holding(&[Release]),
+    Step::ci("fmt", "Check the formatting", steps::fmt::run),
+    Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
+    Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
+        .after(&["program"]),
+    Step::ci("test", "Run `cargo test`, on recorded data as well", steps::test::run)
+        .holding(&[Debug])
+        .accepting(&[Rest]),
+    Step::ci("ground", "Fly from the ground station's page in a real browser", steps::ground::run)
+        .after(&["program"])
+        .accepting(&[Rest]),
+    Step::ci("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
+        .after(&["program"])
+        .accepting(&[Rest]),
+    Step::ci("esp32", "Type-check the ESP32-S3 firmware, link it for the ESP32-C6", steps::esp32::run)
+        .holding(&[Esp32]),
+    Step::ci("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run),
+    Step::ci("features", "Check each library with each of its features alone", steps::features::run),
+    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
+    Step::ci("golden", "Compare the golden flight with a new recording", steps::golden::run)
+        .after(&["program"])
+        .accepting(&[Fix]),
+    Step::ci("faults", "Fly two hundred flights with faults", steps::campaign::some).after(&["program"]),
+    Step::ci("doc", "Build the documentation; a warning fails", steps::doc::run).holding(&[Debug]),
+    Step::ci("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
+        .after(&["program"])
+        .accepting(&[Fix]),
+    Step::ci("examples", "Run every example to its end", steps::examples::run).holding(&[Debug]).after(&["test"]),
+    Step::ci("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
+        .holding(&[Debug]),
+    Step::ci("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run)
+        .after(&["program"])
+        .accepting(&[File]),
+    Step::ci("python", "Run the tests of the Python example, check its types", steps::python::run),
+    // Every night.
+    Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
+        .accepting(&[Fix, Rest]),
+    Step::nightly("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)
+        .accepting(&[Fix, Rest]),
+    Step::nightly("coverage", "Find lines of mode, failsafe and mixer that no test runs", steps::coverage::run),
+    Step::nightly("loom", "Run the bus's loom models in every interleaving", steps::loom::run).accepting(&[Rest]),
+    Step::nightly("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
+        .holding(&[Qemu])
+        .accepting(&[Fix]),
+    Step::nightly("hil", "Fly a mission with the vehicle on an emulated core: the same bits", steps::hil::run)
+        .holding(&[Qemu]),
+    Step::nightly("record", "Replay what the emulated board recorded of a flight, bit for bit", steps::record::run)
+        .holding(&[Qemu]),
+    Step::nightly("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
+        .holding(&[Qemu])
+        .accepting(&[Fix]),
+    Step::nightly("esp32-wifi", "Link the firmware with the feature `wifi` for the ESP32-C6", steps::esp32::wifi)
+        .holding(&[Esp32]),
+    Step::nightly("foreign", "Run the ESP32-C6 firmware on an emulator that is not ours", steps::foreign::run)
+        .holding(&[Esp32]),
+    Step::nightly(
+        "memory",
+        "Hold the firmware's (or FILE's) flash, memory and stack to their budgets",
+        steps::memory::run,
     )
-    .accepting(&[Seconds])
-    .beside(),
-    Step::new("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run).accepting(&[File]),
-    Step::new("budget", "Count the instructions of a 400 Hz step on this PC", steps::budget::run),
-    Step::new(
-        "cortex-m4f",
-        "Count the estimator's instructions on a Cortex-M4F, compare its bits",
-        steps::cortex_m4f::run,
-    ),
-    Step::new("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run).beside(),
-    Step::new("esp32", "Type-check the ESP32-S3 firmware, build it for the ESP32-C6", steps::esp32::run).beside(),
-    Step::new("foreign", "Run the ESP32-C6 firmware on an emulator that is not ours", steps::foreign::run).beside(),
-    Step::new("memory", "Hold the firmware's (or FILE's) flash, memory and stack to their budgets", steps::memory::run)
-        .beside()
-        .accepting(&[Fix, File]),
-    Step::new(
+    .holding(&[Esp32])
+    .accepting(&[Fix, File]),
+    Step::nightly(
         "panic-calls",
         "Find calls that panic in the firmware's (or FILE's) flight code",
         steps::panic_calls::run,
     )
-    .beside()
+    .holding(&[Esp32])
     .accepting(&[File]),
-    Step::new(
+    Step::nightly("stm32", "Build the STM32 quadcopter's firmware, hold it to flash and memory", steps::stm32::run)
+        .accepting(&[Debian]),
+    Step::nightly("cortex-m4f", "Count the estimator's instructions on a Cortex-M4F", steps::cortex_m4f::run),
+    Step::nightly("hals", "Build the drivers' examples for Linux, RP2350, STM32 and ESP32", steps::hals::run)
+        .accepting(&[Debian]),
+    Step::nightly(
         "package",
         "Build each crate from its package, and run the first example of its README",
         steps::package::run,
+    ),
+    Step::nightly("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run),
+    Step::nightly("semver", "Compare each library's interface with the last release's", steps::semver::run),
+    Step::nightly("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),
+    Step::nightly("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run)
+        .holding(&[Debug, Release]),
+    Step::nightly("shards", "Fly a campaign on a HyperQueue server that loses a worker", steps::shards::run),
+    Step::nightly("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)
+        .holding(&[Debug])
+        .accepting(&[Fix]),
+    Step::nightly("budget", "Count the instructions of a 400 Hz step on this PC", steps::budget::run)
+        .holding(&[Release]),
+    Step::nightly(
+        "search",
+        "Search with libFuzzer and the address sanitizer, each target for SECONDS (20)",
+        steps::search::run,
     )
-    .beside(),
-    Step::new("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run).beside(),
-    Step::new("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build).manual(),
-    Step::new("semver", "Compare each library's interface with the last release's", steps::semver::run).beside(),
-    Step::new("soak", "Watch ten vehicles for half an hour, or for SECONDS", steps::soak::run)
-        .manual()
-        .accepting(&[Rest]),
-    Step::new("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run).beside(),
-    Step::new("python", "Run the tests of the Python example, check its types", steps::python::run).beside(),
-    Step::new("ground", "Fly from the ground station's page in a real browser", steps::ground::run).accepting(&[Rest]),
-    Step::new("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
-        .accepting(&[Rest]),
-    Step::new("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run),
-    Step::new("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).alone(),
-    Step::new("shards", "Fly a campaign on a HyperQueue server that loses a worker", steps::shards::run),
-    Step::new("golden", "Compare the golden flight with a new recording", steps::golden::run).accepting(&[Fix]),
-    Step::new("qemu", "Replay the golden flight on emulated cores: bits and instructions", steps::qemu::run)
-        .beside()
-        .accepting(&[Fix]),
-    Step::new("hil", "Fly a mission with the vehicle on an emulated core: the same bits", steps::hil::run),
-    Step::new("record", "Replay what the emulated board recorded of a flight, bit for bit", steps::record::run)
-        .beside(),
-    Step::new("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
-        .beside()
-        .accepting(&[Fix]),
-    Step::new("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
-        .accepting(&[Fix]),
-    Step::new("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),
-    Step::new("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters)
-        .accepting(&[Rest])
-        .manual(),
-    Step::new(
+    .accepting(&[Seconds]),
+    Step::nightly("soak", "Watch ten vehicles for half an hour, or for SECONDS", steps::soak::run).accepting(&[Rest]),
+    Step::nightly(
         "campaign",
         "Fly two thousand flights with faults: no invariant violated, no new wrong end",
-        steps::campaign::run,
+        steps::campaign::all,
     )
-    .alone(),
-    Step::new("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
-        .beside()
-        .accepting(&[Fix, Rest]),
-    Step::new("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)
-        .accepting(&[Fix, Rest])
-        .manual(),
-    Step::new("figures", "Measure the README's figures and write them there", steps::figures::run).manual(),
-    Step::new("peers", "Measure the estimator beside other crates", steps::peers::run).accepting(&[Fix]).manual(),
-    Step::new("against", "Measure chain, control and simulation beside an earlier commit", steps::against::run)
-        .manual(),
-    Step::new("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)
-        .accepting(&[Fix])
-        .manual(),
+    .holding(&[Machine]),
+    Step::nightly("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).holding(&[Machine]),
+    Step::nightly("peers", "Measure the estimator beside other crates", steps::peers::run)
+        .holding(&[Machine])
+        .accepting(&[Fix]),
+    // Only by name.
+    Step::manual("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build),
+    Step::manual("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters).accepting(&[Rest]),
+    Step::manual("figures", "Measure the README's figures and write them there", steps::figures::run),
 ];
 
 fn main() -> ExitCode {
     // Exits with 0 after `--help` and with 2 after a wrong command line.
     let matches = step::command(STEPS).get_matches();
     let repository = Repository::find();
-    let outcome = match step::chosen(STEPS, &matches) {
-        Ok(Some((step, arguments))) => {
-            (step.run)(&repository, &arguments).map_err(|failure| format!("{}: {failure}", step.name))
+    let outcome = step::chosen(STEPS, &matches).and_then(|chosen| match chosen {
+        Chosen::Step(name, arguments) => {
+            let step = STEPS.iter().find(|step| step.name == name).ok_or("no such step")?;
+            (step.run)(&repository, &arguments).map_err(|failure| format!("{name}: {failure}"))
         }
-        Ok(None) => ci::run(&repository, STEPS),
-        Err(failure) => Err(failure),
-    };
+        Chosen::Lane(lane, selection) => lane::run(&repository, STEPS, lane, &selection),
+    });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -11,9 +11,6 @@ pub type Failure = String;
 /// Published libraries for a PC. Every other one has to build for bare metal.
 const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-ground", "stampfly-host", "stampfly-lab", "stampfly-sim"];
 
-/// Folder of the vehicles after the first.
-pub const VEHICLES: &str = "vehicles";
-
 /// The working copy.
 pub struct Repository {
     /// Its top folder.

@@ -6,8 +6,9 @@
 //! runs of a minute: what shares a machine with others was seen to slow down by 1.7 for some seconds, without a sign of it in
 //! its own times. What a step costs, whatever the machine does, is counted by `budget`.
 
+use super::program::built;
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, capture, json, run as run_program};
+use crate::repository::{Failure, Repository, capture, json};
 use serde_json::Value;
 use std::fs;
 use std::time::{Duration, Instant};
@@ -24,11 +25,11 @@ const TIMED: &str = "8";
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
+    let program = built(repository)?.display().to_string();
     let mut failures = Vec::new();
     for (mission, arguments) in CAMPAIGNS {
         let title = [&[mission], arguments].concat().join(" ");
-        let mut campaign = repository.command(&stampfly(repository));
+        let mut campaign = repository.command(&program);
         campaign.args(["campaign", "--json", "--flights", FLIGHTS, "--mission", mission]).args(arguments);
         // It fails by itself when a flight does not land or disarm.
         let report = match capture(&mut campaign) {
@@ -44,17 +45,13 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         }
     }
     for (arguments, least) in SPEEDS {
-        let speed = speed(repository, arguments, least)?;
+        let speed = speed(repository, &program, arguments, least)?;
         let said =
             format!("one core simulates {speed:.0} times as fast as real time {arguments:?}; {least} is the least");
         println!("{said}");
         failures.extend((speed < least).then_some(said));
     }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
-}
-
-fn stampfly(repository: &Repository) -> String {
-    repository.target("release/stampfly").display().to_string()
 }
 
 /// Every bar of a mission in words, and whether the campaign's report keeps it.
@@ -70,14 +67,14 @@ fn check(mission: &str, report: &Value) -> Result<Vec<(String, bool)>, Failure> 
 }
 
 /// The best of some runs on one core. Stops as soon as the bar is reached.
-fn speed(repository: &Repository, arguments: &[&str], least: f64) -> Result<f64, Failure> {
+fn speed(repository: &Repository, program: &str, arguments: &[&str], least: f64) -> Result<f64, Failure> {
     let status = fs::read_to_string("/proc/self/status").map_err(|e| format!("/proc/self/status: {e}"))?;
     let core = first_core(&status).ok_or("no Cpus_allowed_list")?;
     let (mut best, begun) = (0.0_f64, Instant::now());
     while best < least && begun.elapsed() < PATIENCE {
         let mut timed = repository.command("bash");
         timed.env("LC_ALL", "C").args(["-c", "TIMEFORMAT='%R %U %S'; time \"$@\"", "time"]);
-        timed.args(["taskset", "-c", core, &stampfly(repository), "campaign", "--json", "--flights", TIMED]);
+        timed.args(["taskset", "-c", core, program, "campaign", "--json", "--flights", TIMED]);
         let (report, times) = capture(timed.args(arguments))?;
         let factor = json(&report)?["realtime_factor"].as_f64().ok_or("no `realtime_factor`")?;
         let share = processor_share(&times).ok_or_else(|| format!("no times in `{times}`"))?;

@@ -1,33 +1,54 @@
-//! `campaign`: does every flight with a fault end as the fault allows, and hold every invariant?
+//! `faults` and `campaign`: every flight with a fault ends as the fault allows, and holds every invariant.
 //!
-//! Two thousand flights: every fault at every moment under a program's commands and in every mode of a pilot, and some at
-//! random. No invariant may be violated. Of wrong ends there are some left, each with its row in `docs/safety.md`; flights are
-//! the same on every machine, so the rows are exact.
+//! | step | flights |
+//! |---|---|
+//! | `faults` | 200: every fault of the table at some moments of a flight under a program's commands |
+//! | `campaign` | 2,000: every fault at every moment, under commands and in every mode of a pilot, and some at random |
+//!
+//! No invariant may be violated. Some flights are known to end wrong; each has its row in `docs/safety.md`. Flights are the same
+//! on every machine, so the rows are exact.
 
+use super::program::stampfly;
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, json, run as run_program};
+use crate::repository::{Failure, Repository, json};
 use serde_json::Value;
 use std::fs;
 use std::process::{Command, Stdio};
 
-const FLIGHTS: &str = "2000";
 /// Has a row for each flight that is known to end wrong, which begins with the fault. It only becomes shorter.
 const KNOWN: &str = "docs/safety.md";
 /// Share of flights whose fault may change nothing: no wall is ahead of a vehicle that lands.
 const MOST_IDLE: f64 = 0.04;
-/// Of a run on two cores, s.
-const LONGEST: f64 = 240.0;
 
-pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
-    let mut campaign = repository.command(&repository.target("release/stampfly").display().to_string());
-    campaign.args(["campaign", "--faults", "--again", "--json", "--flights", FLIGHTS, "--out"]);
-    let report = report(campaign.arg(repository.target("campaign")))?;
+/// A campaign of this size.
+struct Size {
+    flights: u32,
+    /// Are the known rows flights of it?
+    all: bool,
+    /// Longest run on two cores, s.
+    longest: f64,
+}
+
+const SOME: Size = Size { flights: 200, all: false, longest: f64::INFINITY };
+const ALL: Size = Size { flights: 2_000, all: true, longest: 240.0 };
+
+pub fn some(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    fly(repository, &SOME, "faults")
+}
+
+pub fn all(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    fly(repository, &ALL, "campaign")
+}
+
+fn fly(repository: &Repository, size: &Size, folder: &str) -> Result<(), Failure> {
+    let mut campaign = stampfly(repository)?;
+    campaign.args(["campaign", "--faults", "--again", "--json", "--flights", &size.flights.to_string(), "--out"]);
+    let report = report(campaign.arg(repository.target(folder)))?;
     let text = fs::read_to_string(repository.root.join(KNOWN)).map_err(|e| format!("{KNOWN}: {e}"))?;
-    let verdict = judged(&report, &known(&text));
+    let verdict = judged(&report, &known(&text), size);
     let number = |name: &str| report[name].as_f64().unwrap_or_default();
     println!("{} flights of {} cells in {:.0} s", number("flights"), number("cells_flown"), number("wall_s"));
-    println!("{}", repository.target("campaign/campaign.html").display());
+    println!("{}", repository.target(folder).join("campaign.html").display());
     verdict
 }
 
@@ -44,18 +65,18 @@ fn known(text: &str) -> Vec<&str> {
 }
 
 /// No flight failed but those that are known, and all of it was flown in time.
-fn judged(report: &Value, known: &[&str]) -> Result<(), Failure> {
+fn judged(report: &Value, known: &[&str], size: &Size) -> Result<(), Failure> {
     let number = |name: &str| report[name].as_f64().ok_or_else(|| format!("no `{name}`"));
     let mut failures = Vec::new();
-    if number("flights")? != 2000.0 || number("cells_flown")? == 0.0 {
+    if number("flights")? != f64::from(size.flights) || number("cells_flown")? == 0.0 {
         failures.push("not all flights were flown".to_owned());
     }
     let idle = number("idle")? / number("flights")?.max(1.0);
     if idle > MOST_IDLE {
         failures.push(format!("in {:.1} % of flights the fault changed nothing: they say nothing", 100.0 * idle));
     }
-    if number("wall_s")? > LONGEST {
-        failures.push(format!("it took {:.0} s; {LONGEST} s is the most", number("wall_s")?));
+    if number("wall_s")? > size.longest {
+        failures.push(format!("it took {:.0} s; {} s is the most", number("wall_s")?, size.longest));
     }
     let (failed, wrong, violated) = (number("failed")?, number("wrong_class")?, number("violated")?);
     let listed = report["failures"].as_array().map(Vec::as_slice).unwrap_or_default();
@@ -66,7 +87,8 @@ fn judged(report: &Value, known: &[&str]) -> Result<(), Failure> {
         listed.iter().filter(|other| text(other, "fault") == fault).count() > rows
     };
     let unknown: Vec<_> = listed.iter().filter(unknown).collect();
-    if violated > 0.0 || failed != known.len() as f64 || !unknown.is_empty() {
+    let ends_well = size.all && failed < known.len() as f64;
+    if violated > 0.0 || ends_well || !unknown.is_empty() {
         failures.push(format!("{failed} flights failed: {wrong} ended wrong, {violated} violated an invariant"));
         failures
             .push(format!("{} are in {KNOWN}; no row goes there, and one that ends well goes from there", known.len()));
@@ -95,14 +117,17 @@ mod tests {
         let known = known("| fault | flight |\n|---|---|\n| `edge@hover` | a |\n| `tof-bias=2@move` | b |\n");
         assert_eq!(known, ["edge@hover", "tof-bias=2@move"]);
         let both = ["tof-bias", "edge"];
-        assert_eq!(judged(&report(&both, 0, 80, 100.0), &known), Ok(()));
-        let failed = judged(&report(&["tof-bias", "edge", "hand"], 0, 0, 100.0), &known).expect_err("a failure");
+        assert_eq!(judged(&report(&both, 0, 80, 100.0), &known, &ALL), Ok(()));
+        let failed = judged(&report(&["tof-bias", "edge", "hand"], 0, 0, 100.0), &known, &ALL).expect_err("a failure");
         assert!(failed.contains("1 × hand at hover: I10: stampfly") && !failed.contains("× edge"), "{failed}");
-        assert!(judged(&report(&["edge", "edge"], 0, 0, 100.0), &known).is_err(), "another one");
-        assert!(judged(&report(&["edge"], 0, 0, 100.0), &known).is_err(), "one that ends well has to be taken out");
-        assert!(judged(&report(&both, 1, 0, 100.0), &known).is_err());
-        assert!(judged(&report(&both, 0, 0, 241.0), &known).is_err());
-        assert!(judged(&report(&both, 0, 81, 100.0), &known).is_err());
-        assert!(judged(&json!({ "flights": 2000 }), &known).is_err());
+        assert!(judged(&report(&["edge", "edge"], 0, 0, 100.0), &known, &ALL).is_err(), "another one");
+        assert!(
+            judged(&report(&["edge"], 0, 0, 100.0), &known, &ALL).is_err(),
+            "one that ends well has to be taken out"
+        );
+        assert!(judged(&report(&both, 1, 0, 100.0), &known, &ALL).is_err());
+        assert!(judged(&report(&both, 0, 0, 241.0), &known, &ALL).is_err());
+        assert!(judged(&report(&both, 0, 81, 100.0), &known, &ALL).is_err());
+        assert!(judged(&json!({ "flights": 2000 }), &known, &ALL).is_err());
     }
 }

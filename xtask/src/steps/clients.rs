@@ -4,6 +4,7 @@
 //! vehicle must not have done what it never may, and the log of the flight has to replay bit for bit without the program. Control: against
 //! a vehicle that is not there, every script has to fail.
 
+use super::program::built;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::io::{BufRead, BufReader};
@@ -50,8 +51,7 @@ const KEY: &str = "5f1d2c8e90b34a67f8e0c1b2a39485760718293a4b5c6d7e8f90a1b2c3d4e
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let python = environment(repository)?;
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "-p", "stampfly-host"]))?;
-    let program = repository.target("release").join("stampfly");
+    let program = built(repository)?;
     refuses_strangers(&program)?;
     for (place, (script, arguments, options)) in SCRIPTS.iter().enumerate() {
         let out = repository.target("clients").join(place.to_string());

@@ -6,6 +6,7 @@
 //! `-- --pictures FOLDER` keeps what the browser saw.
 
 use super::ground::PLAYWRIGHT;
+use super::program::built;
 use crate::arguments::Arguments;
 use crate::machine::{BROWSER, provide};
 use crate::repository::{Failure, Repository, add_targets, capture, json, python_tool, run as run_program};
@@ -27,8 +28,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     };
     run_program(inside(&["clippy"]).args(["--", "-D", "warnings"]))?;
     run_program(&mut inside(&["build"]))?;
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
-    let program = repository.target("release/stampfly");
+    let program = built(repository)?;
     let page = repository.target("demo/demo.html");
     std::fs::create_dir_all(repository.target("demo")).map_err(|error| error.to_string())?;
     let module = place.join(TARGET).join("release").join(MODULE);

@@ -14,6 +14,7 @@
 //!
 //! Every document is checked that git tracks or would add.
 
+use super::program::stampfly;
 use crate::arguments::Arguments;
 use crate::changelog;
 use crate::front_page;
@@ -96,9 +97,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     failures.extend(changelog::failures(repository)?);
     failures.extend(front_page::failures(repository)?);
     for (name, command, introduction) in GENERATED {
-        let mut list = repository.cargo();
-        let (table, _) =
-            capture(list.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", command, "--markdown"]))?;
+        let (table, _) = capture(stampfly(repository)?.args([command, "--markdown"]))?;
         let (path, page) = (root.join(name), format!("{introduction}\n\n{table}"));
         if fs::read_to_string(&path).is_ok_and(|committed| committed == page) {
             continue;
@@ -193,16 +192,13 @@ fn missing_fields(root: &Path) -> Result<Vec<Failure>, Failure> {
     Ok(missing.map(|field| format!("{guide}: the guide to tuning leaves out `{field}`")).collect())
 }
 
-/// Names of the public fields of a structure.
+/// Names of the public fields of a structure, in a source file as `cargo fmt` leaves it.
 fn public_fields(source: &str, structure: &str) -> Result<Vec<String>, Failure> {
-    let file = syn::parse_file(source).map_err(|e| e.to_string())?;
-    let found = file.items.iter().find_map(|item| match item {
-        syn::Item::Struct(item) if item.ident == structure => Some(item),
-        _ => None,
-    });
-    let fields = &found.ok_or_else(|| format!("no `struct {structure}`"))?.fields;
-    let public = fields.iter().filter(|field| matches!(field.vis, syn::Visibility::Public(_)));
-    Ok(public.filter_map(|field| Some(field.ident.as_ref()?.to_string())).collect())
+    let begin = format!("pub struct {structure} {{");
+    let body = source.lines().skip_while(|line| *line != begin).skip(1).take_while(|line| *line != "}");
+    let field = |line: &str| Some(line.strip_prefix("    pub ")?.split_once(':')?.0.to_owned());
+    let fields: Vec<String> = body.filter_map(field).collect();
+    if fields.is_empty() { Err(format!("no `struct {structure}` with public fields")) } else { Ok(fields) }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! | S3, a wrong pin | that the check above refuses one | |
 //! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
 //! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
-//! | C6, image, also with the feature `wifi` | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
+//! | C6, image; `esp32-wifi`: with the feature `wifi` | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
 //! | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
 //!
 //! No stock compiler has inline assembly for Xtensa yet, so the first two present a 32-bit architecture that has it under
@@ -47,13 +47,19 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let scripts = s3_scripts(repository)?;
     esp32_link::heap(repository, &scripts)?;
-    for variant in [Variant::Default, Variant::Wifi] {
-        println!("{}:", variant.name());
-        let program = c6(repository, variant)?;
-        s3_memory::stack(repository, &program, &scripts)?;
-        image(repository, &program)?;
-    }
-    Ok(())
+    linked(repository, Variant::Default, &scripts)
+}
+
+/// `esp32-wifi`: the firmware with the feature `wifi` links, leaves a stack and makes an image.
+pub fn wifi(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    linked(repository, Variant::Wifi, &s3_scripts(repository)?)
+}
+
+fn linked(repository: &Repository, variant: Variant, scripts: &S3Scripts) -> Result<(), Failure> {
+    println!("{}:", variant.name());
+    let program = c6(repository, variant)?;
+    s3_memory::stack(repository, &program, scripts)?;
+    image(repository, &program)
 }
 
 /// What `cargo run` hands to espflash, whose own defaults are two wires at 40 MHz: a pass of the flight band would then take longer than

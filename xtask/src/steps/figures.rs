@@ -2,6 +2,7 @@
 //!
 //! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
 
+use super::program::stampfly;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture};
 use std::fmt::Write;
@@ -23,14 +24,9 @@ const CAMPAIGNS: &[(&str, &[&str])] = &[
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut text = String::new();
     for (title, arguments) in CAMPAIGNS {
-        let (table, _) = stampfly(repository, arguments)?;
+        let (table, _) = capture(stampfly(repository)?.args(*arguments))?;
         let _ = write!(text, "{title}: `stampfly {}`\n\n```text\n{table}```\n\n", arguments.join(" "));
     }
     print!("{text}");
     repository.fill("README.md", BEGIN, END, &text)
-}
-
-fn stampfly(repository: &Repository, arguments: &[&str]) -> Result<(String, String), Failure> {
-    let mut command = repository.cargo();
-    capture(command.args(["run", "--quiet", "--release", "--bin", "stampfly", "--"]).args(arguments))
 }

@@ -5,6 +5,7 @@
 //! written to the browser's console, and no request may leave this machine. `-- --pictures FOLDER` keeps what it saw. Then the same of `stampfly connect`, whose
 //! vehicle is at the other end of a pseudo-terminal (`xtask/ground/connect.py`), and is unplugged.
 
+use super::program::built;
 use crate::arguments::Arguments;
 use crate::machine::{BROWSER, provide};
 use crate::repository::{Failure, Repository, python_tool, run as run_program};
@@ -17,15 +18,15 @@ const PORTS: [&str; 2] = ["http=0", "others=off"];
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&BROWSER])?;
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "--bin", "stampfly"]))?;
+    let program = built(repository)?;
     let mut script = python_tool(repository, PLAYWRIGHT, "python3")?;
     script.arg("-B").arg(repository.root.join(SCRIPT)).args(&arguments.rest);
-    script.arg(repository.target("release/stampfly")).args(["serve", "--count", "2"]);
+    script.arg(&program).args(["serve", "--count", "2"]);
     for port in PORTS {
         script.args(["--port", port]);
     }
     run_program(script.arg("--out").arg(repository.target("ground")))?;
     let mut script = python_tool(repository, PLAYWRIGHT, "python3")?;
-    script.arg("-B").arg(repository.root.join(CONNECTED)).arg(repository.target("release/stampfly"));
+    script.arg("-B").arg(repository.root.join(CONNECTED)).arg(&program);
     run_program(script.arg(repository.target("ground")))
 }

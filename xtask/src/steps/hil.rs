@@ -5,6 +5,7 @@
 //! conversation, compiled for it. The hash is over everything published, the duties too. Controls: another seed must give
 //! another hash, and a vehicle that is gone must be an error.
 
+use super::program::built;
 use super::qemu::{MACHINES, Machine, inside, toolchain};
 use crate::arguments::Arguments;
 use crate::machine::{EMULATED_OTHERS, provide};
@@ -27,11 +28,11 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(clippy.arg(repository.target("qemu")).args(["--", "-D", "warnings"]))?;
     let machine = MACHINES.iter().find(|machine| machine.target == TARGET).ok_or("no such machine")?;
     let vehicle = format!("{EMULATOR} {}", vehicle(repository, machine)?.display());
-    run_program(repository.cargo().args(["build", "--quiet", "--release", "-p", "stampfly-host"]))?;
+    let stampfly = built(repository)?;
 
     let flown = |seed: &str, options: &[&str]| -> Result<String, Failure> {
         let mut limited = repository.command("timeout");
-        limited.arg(SECONDS).arg(repository.target("release").join("stampfly")).args(options);
+        limited.arg(SECONDS).arg(&stampfly).args(options);
         let out = repository.target("hil");
         limited.args(["--mission", MISSION, "--seed", seed, "--json", "--out"]).arg(&out);
         Ok(capture(&mut limited)?.0)

@@ -1,6 +1,5 @@
 //! One file a step.
 
-pub mod against;
 pub mod bars;
 pub mod book;
 pub mod budget;
@@ -9,7 +8,6 @@ pub mod cache;
 pub mod campaign;
 pub mod clients;
 pub mod clippy;
-pub mod constants;
 mod core1;
 pub mod cortex_m4f;
 pub mod coverage;
@@ -22,7 +20,6 @@ mod esp32_link;
 pub mod examples;
 pub mod features;
 pub mod figures;
-pub mod files;
 pub mod fmt;
 pub mod foreign;
 pub mod fuzz;
@@ -30,7 +27,6 @@ pub mod golden;
 pub mod ground;
 pub mod hals;
 pub mod hil;
-pub mod lines;
 pub mod loom;
 pub mod machine;
 pub mod memory;
@@ -41,6 +37,7 @@ pub mod package;
 pub mod panic_calls;
 pub mod panic_proof;
 pub mod peers;
+pub mod program;
 pub mod python;
 pub mod qemu;
 pub mod record;

@@ -1,5 +1,6 @@
 //! `ulog`: the tools of the formats' own authors open the log of a flight, and find in it what ours say is in it.
 
+use super::program::stampfly;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use std::fs;
@@ -14,9 +15,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     fs::create_dir_all(&folder).map_err(io)?;
     let log = match &arguments.file {
         None => {
-            let mut fly = repository.cargo();
-            fly.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "fly", "--out"]).arg(&folder);
-            run_program(&mut fly)?;
+            run_program(stampfly(repository)?.args(["fly", "--out"]).arg(&folder))?;
             folder.join("flight.ulg")
         }
         Some(path) => std::path::absolute(path).map_err(io)?,
@@ -46,14 +45,9 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
 
 /// The same log as MCAP, read by the format's own library: every sample is there.
 fn mcap(repository: &Repository, log: &Path) -> Result<(), Failure> {
-    let stampfly = || {
-        let mut command = repository.cargo();
-        command.args(["run", "--quiet", "--release", "--bin", "stampfly", "--", "log"]);
-        command
-    };
     let file = repository.target("ulog").join("flight.mcap");
-    run_program(stampfly().arg("mcap").arg(log).arg("--out").arg(&file))?;
-    let (info, _) = capture(stampfly().arg("info").arg(log))?;
+    run_program(stampfly(repository)?.args(["log", "mcap"]).arg(log).arg("--out").arg(&file))?;
+    let (info, _) = capture(stampfly(repository)?.args(["log", "info"]).arg(log))?;
     let samples = |line: &str| line.split_whitespace().nth(1)?.parse::<usize>().ok();
     let table = info.lines().skip_while(|line| !line.starts_with("topic")).skip(1);
     let expected: usize = table.filter_map(samples).sum();
