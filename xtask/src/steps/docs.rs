@@ -10,13 +10,14 @@
 //! | generated pages | they are what the program prints; `--fix` writes them |
 //! | front pages of crates | description, keywords, categories, all features documented on sites and named in the README |
 //! | changelogs | each published crate has an entry for its version, under one for what comes next |
-//! | the tables of re-inserted bugs and of mutants | they are what `xtask/bugs.toml` and `xtask/mutants.toml` say; `--fix` writes them |
+//! | the tables of re-inserted bugs, mutants and controls | they are what the lists in `xtask/*.toml` say; `--fix` writes them |
 //!
 //! Every document is checked that git tracks or would add.
 
 use super::program::stampfly;
 use crate::arguments::Arguments;
 use crate::changelog;
+use crate::control::{self, List as Controls};
 use crate::front_page;
 use crate::mutation::list::List as Mutants;
 use crate::mutation::page as mutants;
@@ -111,7 +112,8 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     }
     let bugs = bugs::table(&List::read(repository)?.bugs);
     let mutants = mutants::table(&Mutants::read(repository)?);
-    for (place, table) in [(bugs::PLACE, bugs), (mutants::PLACE, mutants)] {
+    let controls = Controls::read(repository)?.table();
+    for (place, table) in [(bugs::PLACE, bugs), (mutants::PLACE, mutants), (control::PLACE, controls)] {
         failures.extend(stale(repository, place, &table, arguments.fix)?);
     }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }

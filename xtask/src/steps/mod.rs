@@ -8,6 +8,7 @@ pub mod cache;
 pub mod campaign;
 pub mod clients;
 pub mod clippy;
+pub mod controls;
 mod core1;
 pub mod cortex_m4f;
 pub mod coverage;
