@@ -1,5 +1,4 @@
 //! Response times beside a cooperative executor that is tried out: random tables, random phases, late samples.
-#![cfg(not(loom))]
 
 use proptest::prelude::*;
 use stampfly_bus::{ActivationInfo, Band, JITTER, TopicInfo, Trigger, Unbounded, response_time};

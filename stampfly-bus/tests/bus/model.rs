@@ -3,7 +3,6 @@
 //!
 //! Runs start a few samples after power-on, where the ring is empty, and a few samples before the generations wrap,
 //! which at 400 Hz takes 124 days.
-#![cfg(not(loom))]
 
 use proptest::prelude::*;
 use stampfly_bus::{Every, Full, Latest, Lossless, Publisher, Stamped, Subscriber, Topic};

@@ -1,7 +1,5 @@
 //! The five data flows of a flight stack, on a small vehicle of their own.
 
-#![cfg(not(loom))]
-
 use proptest::prelude::*;
 use stampfly_bus::{
     Activation, AnyTopic, Band, Message, PublishWords, ReadInputs, Runnable, Schedule, Scheduler, Split, Stamped, Taps,
