@@ -1,10 +1,10 @@
 //! Closed-loop flights: controllers, mixer and guidance against a vehicle that is not theirs.
 //!
-//! `cargo test -p stampfly-control --test flight -- --nocapture` prints the figures.
+//! `cargo test -p stampfly-control --test control flight:: -- --nocapture` prints the figures.
 
 mod held;
 mod indi;
-mod plant;
+pub mod plant;
 
 use plant::{AIRFRAME, Flight, Spread, Vehicle, gust};
 use stampfly_control::guidance::{Navigator, NavigatorInput};

@@ -1,10 +1,6 @@
 //! Tuning a whole vehicle: six degrees of freedom, cascade, mixer, wind.
 
-#[path = "../flight/plant.rs"]
-#[allow(dead_code, reason = "the flights use the rest")]
-mod body;
-
-use body::{AIRFRAME, Flight, Spread, Vehicle, gust};
+use crate::flight::plant::{AIRFRAME, Flight, Spread, Vehicle, gust};
 use stampfly_control::autotune::{Autotune, AutotuneAxis, AutotuneInput, AutotuneReport, AutotuneStage};
 use stampfly_control::intent::Intent;
 use stampfly_control::rate::RateConfig;

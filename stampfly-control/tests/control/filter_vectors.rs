@@ -4,7 +4,7 @@ use serde_json::Value;
 use stampfly_control::filter::{BiquadChain, BiquadCoefficients, LowPass};
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/filters.json")).expect("valid JSON")
+    serde_json::from_str(include_str!("../vectors/filters.json")).expect("valid JSON")
 }
 
 fn numbers(value: &Value) -> Vec<f32> {

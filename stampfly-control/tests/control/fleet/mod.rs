@@ -1,6 +1,6 @@
 //! The same rules for vehicles from a palm's size to eight rotors of ten inches: gains from mass, inertia and motor lag, any loop rate.
 //!
-//! `cargo test -p stampfly-control --test fleet -- --nocapture` prints the figures.
+//! `cargo test -p stampfly-control --test control fleet -- --nocapture` prints the figures.
 
 mod plant;
 
