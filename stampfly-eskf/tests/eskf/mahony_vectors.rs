@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 const CLOSE: f64 = 3e-5;
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/mahony.json")).expect("valid JSON")
+    serde_json::from_str(include_str!("../vectors/mahony.json")).expect("valid JSON")
 }
 
 fn array<const N: usize>(value: &Value) -> [f64; N] {

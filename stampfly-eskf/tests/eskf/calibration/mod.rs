@@ -1,6 +1,6 @@
 //! The calibrations find what was put in, and survive what no sensor sends.
 //!
-//! `cargo test -p stampfly-eskf --test calibration -- --nocapture` prints how near they come, over seeded vehicles.
+//! `cargo test -p stampfly-eskf --test eskf calibration -- --nocapture` prints how near they come, over seeded vehicles.
 
 mod garbage;
 mod inertial;
