@@ -1,8 +1,6 @@
 //! The public path manager's own numbers: way-points of take-off and landing, the slope's altitude, and which stage follows which.
 
-mod bench;
-
-use bench::Bench;
+use crate::bench::Bench;
 use serde_json::Value;
 use stampfly_control::fixed_wing::runway::{AHEAD, Geodetic, SlopePoints, faces, slope_altitude};
 use stampfly_fixed_wing::messages::{Demand, Lateral, Place, Thrust, Vertical};
@@ -12,7 +10,7 @@ use stampfly_fixed_wing::modes::{Order, PlaneMode};
 const NEAR: f64 = 1e-9;
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/zeropilot.json")).expect("JSON")
+    serde_json::from_str(include_str!("../vectors/zeropilot.json")).expect("JSON")
 }
 
 fn number(value: &Value) -> f64 {

@@ -1,8 +1,6 @@
 //! How modes end otherwise than well, and what follows.
 
-mod bench;
-
-use bench::Bench;
+use crate::bench::Bench;
 use stampfly_fixed_wing::Config;
 use stampfly_fixed_wing::messages::{AirState, CycleStatus, Demand, Home, Lateral, Place, Safety, Thrust, Troubles};
 use stampfly_fixed_wing::modes::{Order, PlaneMode};
