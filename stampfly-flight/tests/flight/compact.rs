@@ -1,5 +1,4 @@
 //! Compact records of a robot: refusals, samples that come in the middle of a pass, interruptions, losses, damage.
-#![cfg(feature = "replay")]
 
 use core::cell::RefCell;
 use proptest::prelude::*;
@@ -131,7 +130,7 @@ impl Runnable for Driver {
 stampfly_bus::schedule! {
     /// The robot.
     #[derive(Clone, Debug, Serialize, Deserialize)]
-    pub struct Robot on crate::topics from f32;
+    pub struct Robot on topics from f32;
 
     /// Plans.
     planner = Planner: on range, flight, 10 us;

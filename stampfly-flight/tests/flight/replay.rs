@@ -1,5 +1,4 @@
 //! Recording and replay on a robot whose planner publishes on a queue that is too short: refusals, gaps, key frames.
-#![cfg(feature = "replay")]
 
 use core::convert::Infallible;
 use proptest::prelude::*;
@@ -91,7 +90,7 @@ impl Runnable for Driver {
 stampfly_bus::schedule! {
     /// The robot.
     #[derive(Clone, Debug, Serialize, Deserialize)]
-    pub struct Robot on crate::topics from f32;
+    pub struct Robot on topics from f32;
 
     /// Plans.
     planner = Planner: on range, flight, 10 us;

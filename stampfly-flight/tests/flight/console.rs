@@ -1,9 +1,7 @@
 //! A conversation with the rover.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod common;
-
-use common::topics::{self, Id};
+use crate::common::topics::{self, Id};
+use crate::common::{ACTIVATIONS, COUNT};
 use core::fmt;
 use proptest::prelude::*;
 use stampfly_bus::TopicInfo;
@@ -14,7 +12,7 @@ use stampfly_flight::{NewestSamples, Profile, longest_message};
 use stampfly_types::messages::{FlightStatus, TofData};
 use stampfly_types::{Instant, Message};
 
-static PROFILE: Profile<{ common::COUNT }> = Profile::new(&common::ACTIVATIONS);
+static PROFILE: Profile<COUNT> = Profile::new(&ACTIVATIONS);
 
 struct Gains([f32; 3]);
 
@@ -195,7 +193,7 @@ fn everything_in_the_help_is_understood() {
     assert_eq!(Rover::new(None).ask("   "), (String::new(), Request::Nothing));
     assert_eq!(Rover::new(None).says("version"), "rover 9.9\r\n");
     assert_eq!(Rover::new(None).says("status"), "awake 5.000000 s\r\n");
-    assert_eq!(Rover::new(None).says("profile").lines().count(), 2 + common::COUNT);
+    assert_eq!(Rover::new(None).says("profile").lines().count(), 2 + COUNT);
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! A black box read out over a terminal.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod common;
-
-use common::topics::{COUNT, Id, TOPICS};
+use crate::common::topics::{COUNT, Id, TOPICS};
 use stampfly_flight::black_box::{BlackBox, DumpError, LogRate, Refused, Retention, dump};
 use stampfly_log::ulog::{Definitions, Message as LogMessage, ParameterValue, Reader, Topic};
 use stampfly_types::{Instant, Message, messages::TofData};

@@ -1,9 +1,6 @@
 //! The rover's flight task on virtual time.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod common;
-
-use common::{Id, Rover, topics};
+use crate::common::{Id, Rover, topics};
 use embedded_hal_async::delay::DelayNs;
 use stampfly_bus::Activation;
 use stampfly_flight::task::fly;

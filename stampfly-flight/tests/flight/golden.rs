@@ -1,10 +1,7 @@
 //! A golden drive of the rover.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod common;
-
-use common::topics::{Bus, Id, TOPICS};
-use common::{COUNT, Rover};
+use crate::common::topics::{Bus, Id, TOPICS};
+use crate::common::{COUNT, Rover};
 use proptest::prelude::*;
 use stampfly_bus::{Activation, Band, PublishWords, Taps};
 use stampfly_flight::golden::{GoldenError, PlayObserver, Report, Verdict, Writer, play, stack_size, tables};

@@ -1,10 +1,7 @@
 //! The vehicle's end of hardware in the loop, question by question, with a rover.
 
-#[allow(dead_code, reason = "each test uses a part")]
-mod common;
-
-use common::Rover;
-use common::topics::{Bus, Id, TOPICS};
+use crate::common::Rover;
+use crate::common::topics::{Bus, Id, TOPICS};
 use core::mem::MaybeUninit;
 use stampfly_flight::Assembled;
 use stampfly_flight::golden::tables;
