@@ -18,7 +18,7 @@ const WAY_POINT: GuidedCommand = GuidedCommand {
 };
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/secure.json")).expect("the vectors")
+    serde_json::from_str(include_str!("../vectors/secure.json")).expect("the vectors")
 }
 
 fn bytes(value: &Value) -> Vec<u8> {

@@ -1,6 +1,5 @@
 //! MAVLink against frames that pymavlink wrote: read, written again bit for bit, refused when one bit is wrong; signatures of
 //! pymavlink believed once.
-#![cfg(feature = "mavlink")]
 
 use proptest::prelude::*;
 use serde_json::Value;
@@ -23,11 +22,11 @@ fn frames(vectors: &str, list: &str) -> Vec<Vec<u8>> {
 }
 
 fn plain() -> Vec<Vec<u8>> {
-    frames(include_str!("vectors/mavlink.json"), "msg")
+    frames(include_str!("../vectors/mavlink.json"), "msg")
 }
 
 fn signed() -> Vec<Vec<u8>> {
-    frames(include_str!("vectors/mavlink_signed.json"), "frames")
+    frames(include_str!("../vectors/mavlink_signed.json"), "frames")
 }
 
 /// What `look` says of every frame that is found.

@@ -1,8 +1,6 @@
 //! What is inside frames: every payload comes out as it went in, and bytes that are taken are the only form of what they say.
 
-mod air;
-
-use air::{Air, TICK, To};
+use crate::air::{Air, TICK, To};
 use proptest::prelude::*;
 use stampfly_link::secure::{Key, KeyError, Kind, MAX_BODY, Payload, Refused, Sample, SealError};
 use stampfly_link::{LinkState, TelemetryPacket};

@@ -8,7 +8,7 @@ use stampfly_link::hisky::{
 use stampfly_types::{Duration, Instant};
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/hisky.json")).expect("well-formed")
+    serde_json::from_str(include_str!("../vectors/hisky.json")).expect("well-formed")
 }
 
 fn list(value: &Value) -> &Vec<Value> {

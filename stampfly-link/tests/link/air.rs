@@ -1,6 +1,5 @@
 //! A vehicle, its station, the air between them, and someone who records all of it, and may seal with a key that he should not
 //! have: by another implementation, so that he can say what a station of ours does not.
-#![allow(dead_code, reason = "every test file uses a part")]
 
 use chacha20::R20;
 use chacha20poly1305::aead::AeadInOut;

@@ -10,7 +10,7 @@ use stampfly_link::types::{Duration, Instant};
 
 /// The frames of a protocol, with their bytes.
 fn frames(protocol: &str) -> Vec<(Value, Vec<u8>)> {
-    let vectors: Value = serde_json::from_str(include_str!("vectors/rc_serial.json")).expect("well-formed");
+    let vectors: Value = serde_json::from_str(include_str!("../vectors/rc_serial.json")).expect("well-formed");
     let frames = vectors[protocol]["frames"].as_array().expect("frames").clone();
     let found: Vec<_> = frames.into_iter().map(|frame| (hex(frame["hex"].as_str().expect("hex")), frame)).collect();
     assert!(found.len() >= 4, "{protocol}");

@@ -1,8 +1,6 @@
 //! Commands over air that loses frames: each is taken once and in its turn, and a kill before all others.
 
-mod air;
-
-use air::{Air, To};
+use crate::air::{Air, PERIOD, To};
 use proptest::prelude::*;
 use stampfly_link::secure::{Commands, MAX_FRAME, Payload};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
@@ -50,7 +48,7 @@ impl Pair {
     fn pass(&mut self, turns: u32) {
         let mut room = [0; MAX_FRAME];
         for _ in 0..turns {
-            self.air.now += air::PERIOD;
+            self.air.now += PERIOD;
             let now = self.air.now;
             if let Some(payload) = self.commands.next(now) {
                 let frame = self.air.station.seal(now, &payload, &mut room).expect("sealed").to_vec();
@@ -176,7 +174,7 @@ fn a_kill_is_acknowledged_although_frames_come_in_pairs() {
     assert!(commands.say(air.now, 7, command(GuidedKind::Kill)) && commands.say(air.now, 8, command(GuidedKind::Arm)));
     let mut frames = Vec::new();
     for _ in 0..3 {
-        air.now += air::PERIOD;
+        air.now += PERIOD;
         let payload = commands.next(air.now).expect("the kill");
         frames.push(air.station.seal(air.now, &payload, &mut room).expect("sealed").to_vec());
     }

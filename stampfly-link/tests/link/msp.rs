@@ -4,7 +4,7 @@ use serde_json::Value;
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame, Version};
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/msp.json")).expect("well-formed")
+    serde_json::from_str(include_str!("../vectors/msp.json")).expect("well-formed")
 }
 
 fn hex(value: &Value) -> Vec<u8> {

@@ -346,7 +346,7 @@ proptest! {
 /// Packed by another program, with the format strings of the one that reads these packets on a PC.
 #[test]
 fn packets_that_another_program_has_packed_mean_what_it_meant() {
-    let vectors: Value = serde_json::from_str(include_str!("vectors/stream.json")).expect("well-formed");
+    let vectors: Value = serde_json::from_str(include_str!("../vectors/stream.json")).expect("well-formed");
     let numbers = |value: &Value| -> Vec<f64> {
         value.as_array().expect("a list").iter().map(|number| number.as_f64().expect("a number")).collect()
     };
