@@ -36,7 +36,6 @@ pub struct Flash {
     pub words_written: usize,
 }
 
-#[allow(dead_code, reason = "each test uses what it needs")]
 impl Flash {
     pub fn new() -> Self {
         Self::with(vec![0xFF; PAGE * PAGES])

@@ -1,9 +1,7 @@
 //! Flash that somebody else has used becomes a store, whatever is in it and whenever the power fails.
 
-mod flash;
-
+use crate::flash::{self, Flash};
 use embassy_futures::block_on;
-use flash::Flash;
 use proptest::prelude::*;
 use stampfly_param::{AnyValue, Disarmed, Kind, LONGEST_NAME, LoadError, ParameterStore, SaveError, key};
 use stampfly_types::messages::FlightStatus;

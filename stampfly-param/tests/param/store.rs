@@ -1,9 +1,7 @@
 //! What is stored stays stored, whatever happens to the power and to the bytes.
 
-mod flash;
-
+use crate::flash::{Flash, FlashError};
 use embassy_futures::block_on;
-use flash::{Flash, FlashError};
 use proptest::prelude::*;
 use stampfly_param::{Disarmed, LoadError, OpenError, ParameterStore, SaveError};
 use stampfly_types::messages::FlightStatus;

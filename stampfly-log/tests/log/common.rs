@@ -1,5 +1,4 @@
 //! What the tests share: a growing sink, topics of every kind, a small log.
-#![allow(dead_code, reason = "each test file uses its own part")]
 
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic, Writer};

@@ -1,8 +1,6 @@
 //! Logs that others wrote, and logs that were damaged.
 
-mod common;
-
-use common::small_log;
+use crate::common::{TOPICS, small_log};
 use proptest::prelude::*;
 use stampfly_log::ulog::{
     FieldError, FlagBits, Format, Level, Message, ParameterValue, ReadError, ReadErrorKind, Reader,
@@ -10,7 +8,7 @@ use stampfly_log::ulog::{
 use stampfly_types::Instant;
 
 /// A log written by hand from the format description and read without complaint by `pyulog` 1.3.0.
-const HAND_BUILT: &[u8] = include_bytes!("hand_built.ulog");
+const HAND_BUILT: &[u8] = include_bytes!("../hand_built.ulog");
 
 #[test]
 fn the_hand_built_log_is_read() {
@@ -144,7 +142,7 @@ fn read_all(log: &[u8]) -> (usize, usize) {
             }
             Ok(Message::Data { payload, .. }) => {
                 intact += 1;
-                for topic in common::TOPICS {
+                for topic in TOPICS {
                     let _ = topic.decode(payload, &mut vec![0; topic.words()]);
                 }
                 let _ = stampfly_log::ActivationTopic::decode(payload, 3);

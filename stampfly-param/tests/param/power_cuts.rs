@@ -1,10 +1,8 @@
 //! The power is cut at every byte of a thousand saved values, and the figures are printed:
-//! `cargo test -p stampfly-param --test power_cuts -- --nocapture`.
+//! `cargo test -p stampfly-param --test param power_cuts -- --nocapture`.
 
-mod flash;
-
+use crate::flash::Flash;
 use embassy_futures::block_on;
-use flash::Flash;
 use stampfly_param::{Disarmed, ParameterStore};
 use stampfly_types::messages::FlightStatus;
 

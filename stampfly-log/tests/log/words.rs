@@ -1,8 +1,6 @@
 //! What is written is read: every word of every message, every activation, whatever the bits.
 
-mod common;
-
-use common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
+use crate::common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
 use proptest::prelude::*;
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Full, Message, Ram, Reader, Sample, Sink, Stamp, Topic, WriteError};
