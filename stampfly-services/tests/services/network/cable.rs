@@ -1,5 +1,4 @@
 //! A network of one cable: the vehicle's stack at one end, a computer at the other, whose own stack hands out addresses.
-#![allow(dead_code, reason = "each test uses a part")]
 
 use smoltcp::iface::{Config, Interface, SocketHandle, SocketSet};
 use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};

@@ -1,8 +1,6 @@
 //! One serial line: a person types, a ground station speaks MAVLink, and this family's own station asks in tunnels of it.
 
-mod common;
-
-use common::{Board, Id, Two, Vehicle, topics};
+use crate::common::{Board, Id, Two, Vehicle, topics};
 use proptest::prelude::*;
 use stampfly_flight::console::Request;
 use stampfly_link::mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage, MavType};

@@ -1,5 +1,4 @@
 //! A vehicle that publishes what a test says and notes what services ask of it.
-#![allow(dead_code, reason = "each test uses a part")]
 
 use core::fmt;
 use stampfly_bus::TopicInfo;

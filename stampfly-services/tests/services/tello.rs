@@ -1,8 +1,6 @@
 //! A Tello's commands: what is answered when, and what the vehicle is asked for.
 
-mod common;
-
-use common::{Id, Vehicle};
+use crate::common::{Id, Vehicle};
 use stampfly_services::Tello;
 use stampfly_services::tello::Destination;
 use stampfly_types::messages::{ArmBlocks, FlightPhase, GuidedKind, Setpoint, SetpointAxes, StateEstimate, Validity};

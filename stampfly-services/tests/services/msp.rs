@@ -1,8 +1,6 @@
 //! The vehicle's end of MSP against answers that another implementation has written, and what it does with gains.
 
-mod common;
-
-use common::{Id, Vehicle};
+use crate::common::{Id, Vehicle};
 use serde_json::Value;
 use stampfly_services::Request;
 use stampfly_services::msp::{Card, Misc, Msp, PidRow, PidTerm, Scale};
@@ -56,7 +54,8 @@ fn asked(vehicle: &mut Vehicle, id: u8, payload: &[u8]) -> Vec<u8> {
 
 /// The answer that the vectors have under this name.
 fn expected(name: &str) -> Vec<u8> {
-    let vectors: Value = serde_json::from_str(include_str!("vectors/msp.json")).expect("JSON");
+    let vectors: Value =
+        serde_json::from_str(include_str!("../../../stampfly-link/tests/vectors/msp.json")).expect("JSON");
     let mut responses = vectors["responses"].as_array().expect("a list").iter();
     let found = responses.find(|response| response["name"].as_str().is_some_and(|other| other.starts_with(name)));
     let hex = found.unwrap_or_else(|| panic!("no {name}"))["hex"].as_str().expect("text");

@@ -1,10 +1,7 @@
 //! The mission protocol and what is flown of it, asked by a ground station made of the crate `mavlink` alone.
-#![cfg(feature = "mavlink")]
 #![allow(deprecated, reason = "older programs send what the protocol has superseded")]
 
-mod common;
-
-use common::{Id, Vehicle};
+use crate::common::{Id, Vehicle};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::signing::{Signer, SigningKey, Verifier};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
@@ -15,6 +12,9 @@ use stampfly_types::{Instant, Vec3};
 const IDENTITY: Identity =
     Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, reach: 0.25, version: [1, 2, 3] };
 const NO: MavMissionType = MavMissionType::MAV_MISSION_TYPE_MISSION;
+
+/// No bytes.
+const NOTHING: [u8; 0] = [];
 
 type Answers = Vec<MavMessage>;
 
@@ -403,7 +403,7 @@ fn a_command_and_an_item_of_another_dialect_are_answered() {
         payload[30] = 8;
         let frame =
             MavlinkWriter::new(255, 190).write_payload::<MavMessage>(id, &payload, &mut bytes).expect("a frame");
-        assert_eq!(scene.hear(1, frame), []);
+        assert_eq!(scene.hear(1, frame), NOTHING);
     }
     scene.says(count(1));
     let mut payload = [0; 38];
@@ -438,7 +438,7 @@ fn with_a_key_only_what_is_signed_does_anything_and_strangers_hear_nothing() {
     };
     let wrong = SigningKey::from_passphrase("another");
     for frame in [kill(None), kill(Some(&mut Signer::new(wrong, 0, 2_000_000)))] {
-        assert_eq!(scene.hear(1, &frame), [], "no answer");
+        assert_eq!(scene.hear(1, &frame), NOTHING, "no answer");
     }
     assert_eq!(scene.vehicle.guided, []);
     assert_eq!(scene.mavlink.untrusted(), 2);
@@ -456,12 +456,12 @@ fn with_a_key_only_what_is_signed_does_anything_and_strangers_hear_nothing() {
         answer.iter().filter_map(|byte| decoder.feed(*byte).map(|frame| verifier.verify(&frame))).collect();
     assert_eq!(judged, [Ok(())], "the answer is signed too");
     assert_eq!(scene.vehicle.guided.len(), 1);
-    assert_eq!(scene.hear(1, &frame), [], "sent again");
+    assert_eq!(scene.hear(1, &frame), NOTHING, "sent again");
     assert_eq!(scene.mavlink.untrusted(), 3);
 
     // On a cable nothing has to be signed.
     scene.mavlink.open_local(scene.now, 2, false);
-    assert_ne!(scene.hear(2, &kill(None)), []);
+    assert_ne!(scene.hear(2, &kill(None)), NOTHING);
     assert_eq!(scene.vehicle.guided.len(), 2);
     let mut told = Vec::new();
     scene.now = Instant::from_secs(20);
@@ -492,7 +492,7 @@ fn strangers_do_not_keep_a_station_with_the_key_out() {
         ..Default::default()
     });
     let frame = MavlinkWriter::new(255, 190).write_signed(Instant::ZERO, &message, &mut signer, &mut bytes);
-    assert_ne!(scene.hear(1, frame.expect("a frame")), []);
+    assert_ne!(scene.hear(1, frame.expect("a frame")), NOTHING);
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! The vehicle's end of MAVLink, asked by a ground station made of the crate `mavlink` alone.
-#![cfg(feature = "mavlink")]
 
-mod common;
-
-use common::{Id, Vehicle};
+use crate::common::{Id, Vehicle};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};

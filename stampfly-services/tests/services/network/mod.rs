@@ -1,12 +1,9 @@
 //! The stack that the firmware has on its radio, on a cable, with a computer at the other end that has a stack of its own.
-#![cfg(feature = "network")]
 
-#[path = "common/cable.rs"]
 mod cable;
-mod common;
 
+use crate::common::Vehicle;
 use cable::{Computer, End, VEHICLE, cable};
-use common::Vehicle;
 use smoltcp::iface::SocketHandle;
 use smoltcp::socket::tcp;
 use stampfly_link::mavlink::dialects::common::*;

@@ -1,8 +1,6 @@
 //! Broadcast telemetry and the data stream: rates, what is in the packets, and what becomes of those who do not ask any more.
 
-mod common;
-
-use common::{Id, Vehicle};
+use crate::common::{Id, Vehicle};
 use stampfly_link::BroadcastPacket;
 use stampfly_link::stream::{StreamEntry, StreamPacket, StreamStatus};
 use stampfly_services::{Cockpit as _, DataStream, Telemetry};
