@@ -14,7 +14,7 @@ const ID: u32 = 0x1234_5678;
 const SETTLED: u64 = 1_000;
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("../../../../stampfly-link/tests/vectors/hisky.json")).expect("well-formed")
+    serde_json::from_str(include_str!("../../../../../stampfly-link/tests/vectors/hisky.json")).expect("well-formed")
 }
 
 fn hex(bytes: &[u8]) -> String {

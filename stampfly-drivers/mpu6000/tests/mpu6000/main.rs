@@ -1,5 +1,7 @@
 //! The MPU-6000 driver against the emulated chip: start, samples, faults of the bus, restarts, calls that are dropped.
 
+mod another_driver;
+
 use core::cell::RefCell;
 use core::future::Future;
 use core::pin::pin;

@@ -1,5 +1,8 @@
 //! The nRF24L01 driver against the emulated chip: start, packets, faults of the bus, restarts, calls that are dropped.
 
+mod another_driver;
+mod hisky;
+
 use core::convert::Infallible;
 use core::future::Future;
 use core::pin::pin;

@@ -1,5 +1,7 @@
 //! The PMW3901 driver against a chip of banks of registers that insists on its pauses.
 
+mod start_sequence;
+
 use embedded_hal_async::spi::{self, Operation};
 use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_core::chip::{Axis, AxisMap, ChipError, TransferLimit};

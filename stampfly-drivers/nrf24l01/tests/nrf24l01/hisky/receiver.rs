@@ -1,6 +1,6 @@
 //! The task of a receiver: the protocol, the radio's driver, and what a vehicle takes of it.
 
-use crate::transmitter::{Identity, Knobs, transmit};
+use super::transmitter::{Identity, Knobs, transmit};
 use core::convert::Infallible;
 use core::future::pending;
 use embedded_hal::digital::ErrorType;
