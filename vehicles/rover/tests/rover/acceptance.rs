@@ -1,8 +1,6 @@
 //! The acceptance list of the architecture document, line by line, on the assembled vehicle.
 
-mod common;
-
-use common::{Events, instant, manual, run};
+use crate::common::{Events, instant, manual, run};
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_log::csv;
@@ -26,7 +24,7 @@ fn demo() -> Vec<LogRecord> {
 
 #[test]
 fn the_documents_scenario_is_reproduced() {
-    let vectors: Value = serde_json::from_str(include_str!("vectors/models.json")).expect("JSON");
+    let vectors: Value = serde_json::from_str(include_str!("../vectors/models.json")).expect("JSON");
     let rows = vectors["scenario_document_order"]["rows"].as_array().expect("a list");
     let records = demo();
     for row in rows {

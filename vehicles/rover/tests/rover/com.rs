@@ -2,7 +2,7 @@
 //!
 //! After a change that is meant to change datagrams, write the file again: `cargo xtask vectors --fix`.
 
-#[path = "vectors/datagrams.rs"]
+#[path = "../vectors/datagrams.rs"]
 mod vectors;
 
 use serde_json::Value;

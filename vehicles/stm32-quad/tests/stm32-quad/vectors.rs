@@ -18,7 +18,7 @@ fn vectors(text: &str) -> Value {
 }
 
 fn logic() -> Value {
-    vectors(include_str!("vectors/fc_logic.json"))
+    vectors(include_str!("../vectors/fc_logic.json"))
 }
 
 fn number(value: &Value) -> f32 {
@@ -37,7 +37,7 @@ fn assert_near(ours: f32, theirs: &Value, tolerance: f32, what: &str) {
 
 #[test]
 fn the_defaults_are_the_documents() {
-    let (parameters, pid) = (Parameters::default(), vectors(include_str!("vectors/pid_mixer.json")));
+    let (parameters, pid) = (Parameters::default(), vectors(include_str!("../vectors/pid_mixer.json")));
     let theirs = &logic()["defaults"];
     let [roll, pitch, yaw] = numbers_of_gains(&theirs["pid"]);
     let Parameters { roll: r, pitch: p, yaw: y, stick, gain, battery, filter, .. } = parameters;
@@ -72,7 +72,7 @@ fn moving(step: u64) -> Vec3 {
 
 #[test]
 fn loops_and_mixer_in_every_case() {
-    let vectors = vectors(include_str!("vectors/pid_mixer.json"));
+    let vectors = vectors(include_str!("../vectors/pid_mixer.json"));
     for (ours, theirs) in QUADROTOR_X.iter().zip(vectors["mix"].as_array().expect("rows")) {
         assert_eq!(*ours, numbers::<3>(theirs));
     }

@@ -12,7 +12,7 @@ const TICK: Duration = Duration::from_millis(10);
 const TOLERANCE: f64 = 1e-5;
 
 fn vectors() -> Value {
-    serde_json::from_str(include_str!("vectors/models.json")).expect("the file is JSON")
+    serde_json::from_str(include_str!("../vectors/models.json")).expect("the file is JSON")
 }
 
 fn rows(value: &Value) -> &[Value] {
