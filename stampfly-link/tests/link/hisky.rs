@@ -1,5 +1,6 @@
 //! HiSKY: frames of public implementations bit for bit, and a receiver that follows a transmitter through loss, jamming and being out of step.
 
+use crate::hex::hex;
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_link::hisky::{
@@ -16,10 +17,7 @@ fn list(value: &Value) -> &Vec<Value> {
 }
 
 fn bytes<const N: usize>(value: &Value) -> [u8; N] {
-    let digits: Vec<u8> =
-        value.as_str().expect("hex").chars().map(|digit| digit.to_digit(16).expect("a digit") as u8).collect();
-    let bytes: Vec<u8> = digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect();
-    bytes.try_into().expect("so many bytes")
+    hex(value).try_into().expect("so many bytes")
 }
 
 fn numbers<const N: usize>(value: &Value) -> [u16; N] {

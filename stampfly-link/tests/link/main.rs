@@ -6,6 +6,7 @@ mod bit_flips;
 mod broadcast;
 mod crsf_telemetry;
 mod datagrams;
+mod hex;
 mod hisky;
 mod joystick;
 #[cfg(feature = "mavlink")]

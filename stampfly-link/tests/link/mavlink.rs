@@ -1,6 +1,7 @@
 //! MAVLink against frames that pymavlink wrote: read, written again bit for bit, refused when one bit is wrong; signatures of
 //! pymavlink believed once.
 
+use crate::hex::hex;
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_link::mavlink::dialects::common::MavMessage;
@@ -15,10 +16,7 @@ const PASSPHRASE: &str = "a long sentence that nobody guesses";
 fn frames(vectors: &str, list: &str) -> Vec<Vec<u8>> {
     let vectors: Value = serde_json::from_str(vectors).expect("JSON");
     let frames = vectors[list].as_array().expect("a list");
-    let hex = |text: &str| -> Vec<u8> {
-        (0..text.len()).step_by(2).map(|at| u8::from_str_radix(&text[at..at + 2], 16).expect("hexadecimal")).collect()
-    };
-    frames.iter().map(|frame| hex(frame["hex"].as_str().expect("text"))).collect()
+    frames.iter().map(|frame| hex(&frame["hex"])).collect()
 }
 
 fn plain() -> Vec<Vec<u8>> {

@@ -1,16 +1,11 @@
 //! Frames of MSP from the protocol's description: read, written again bit for bit, and refused when they are broken.
 
+use crate::hex::hex;
 use serde_json::Value;
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame, Version};
 
 fn vectors() -> Value {
     serde_json::from_str(include_str!("../vectors/msp.json")).expect("well-formed")
-}
-
-fn hex(value: &Value) -> Vec<u8> {
-    let digits: Vec<_> =
-        value.as_str().expect("hex").chars().map(|digit| digit.to_digit(16).expect("a digit") as u8).collect();
-    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }
 
 /// The one frame in these bytes, checked to be the same when it is written.

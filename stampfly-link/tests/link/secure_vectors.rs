@@ -1,5 +1,6 @@
 //! The secure session against another implementation: `secure_vectors.py` made the frames, of OpenSSL's ciphers.
 
+use crate::hex::hex;
 use chacha20poly1305::aead::AeadInOut;
 use chacha20poly1305::{ChaCha20Poly1305, KeyInit, Nonce};
 use serde_json::Value;
@@ -21,14 +22,8 @@ fn vectors() -> Value {
     serde_json::from_str(include_str!("../vectors/secure.json")).expect("the vectors")
 }
 
-fn bytes(value: &Value) -> Vec<u8> {
-    let text = value.as_str().expect("text");
-    let byte = |place| u8::from_str_radix(&text[place..place + 2], 16).expect("a byte");
-    (0..text.len()).step_by(2).map(byte).collect()
-}
-
 fn number(value: &Value) -> [u8; 8] {
-    bytes(value).try_into().expect("eight bytes")
+    hex(value).try_into().expect("eight bytes")
 }
 
 fn key(vectors: &Value) -> Key {
@@ -90,7 +85,7 @@ fn same(one: &Received<'_>, other: &Payload<'_>) -> bool {
 fn the_text_of_a_key_is_as_another_program_writes_it() {
     let vectors = vectors();
     let key = key(&vectors);
-    assert_eq!(key.bytes()[..], bytes(&vectors["key"]));
+    assert_eq!(key.bytes()[..], hex(&vectors["key"]));
     assert_eq!(u64::from(key.id()), vectors["key_id"].as_u64().expect("a number"));
     assert_eq!(key.uri().to_string(), vectors["uri"].as_str().expect("text"));
 }
@@ -103,14 +98,14 @@ fn a_handshake_and_every_kind_of_frame_are_those_of_another_implementation_bit_f
     let mut room = [0; MAX_FRAME];
 
     let announcement = vehicle.transmit(NOW, of_vehicle, &mut room).expect("an announcement").to_vec();
-    assert_eq!(announcement, bytes(&vectors["announcement"]));
+    assert_eq!(announcement, hex(&vectors["announcement"]));
     assert_eq!(station.receive(NOW, &mut announcement.clone()), Ok(None));
     let join = station.transmit(NOW, of_station, &mut room).expect("an answer").to_vec();
-    assert_eq!(join, bytes(&vectors["join"]));
+    assert_eq!(join, hex(&vectors["join"]));
     assert_eq!(vehicle.receive(NOW, &mut join.clone()), Ok(None));
 
     for vector in vectors["frames"].as_array().expect("frames") {
-        let (name, expected) = (vector["name"].as_str().expect("a name"), bytes(&vector["frame"]));
+        let (name, expected) = (vector["name"].as_str().expect("a name"), hex(&vector["frame"]));
         let sealed = match name {
             "welcome" => vehicle.transmit(NOW, [0; 8], &mut room).expect("a welcome"),
             "ready" => station.transmit(NOW, [0; 8], &mut room).expect("ready"),
@@ -129,7 +124,7 @@ fn a_handshake_and_every_kind_of_frame_are_those_of_another_implementation_bit_f
                 assert!(same(&received, &payload(name)), "{name}: {received:?}");
                 let mut body = [0; 250];
                 let length = received.payload.encode(&mut body).expect("encoded");
-                assert_eq!(body[..length], bytes(&vector["body"]), "{name}");
+                assert_eq!(body[..length], hex(&vector["body"]), "{name}");
             }
         }
     }
@@ -140,7 +135,7 @@ fn a_handshake_and_every_kind_of_frame_are_those_of_another_implementation_bit_f
 fn frames_of_every_length_are_those_of_the_crate_that_has_cipher_and_authenticator_in_one() {
     let vectors = vectors();
     let shared = key(&vectors);
-    let purpose = [bytes(&vectors["of_vehicle"]), bytes(&vectors["of_station"])].concat();
+    let purpose = [hex(&vectors["of_vehicle"]), hex(&vectors["of_station"])].concat();
     let purpose: [u8; 16] = purpose.try_into().expect("two numbers");
     let session = chacha20::hchacha::<chacha20::R20>(&(*shared.bytes()).into(), &purpose.into());
     let cipher = ChaCha20Poly1305::new(&session);
@@ -170,8 +165,8 @@ fn frames_of_every_length_are_those_of_the_crate_that_has_cipher_and_authenticat
 #[test]
 fn the_derivation_of_keys_gives_the_drafts_vector() {
     let draft = &vectors()["draft"];
-    let key: [u8; 32] = bytes(&draft["key"]).try_into().expect("a key");
-    let purpose: [u8; 16] = bytes(&draft["purpose"]).try_into().expect("sixteen bytes");
+    let key: [u8; 32] = hex(&draft["key"]).try_into().expect("a key");
+    let purpose: [u8; 16] = hex(&draft["purpose"]).try_into().expect("sixteen bytes");
     let derived = chacha20::hchacha::<chacha20::R20>(&key.into(), &purpose.into());
-    assert_eq!(derived[..], bytes(&draft["derived"]));
+    assert_eq!(derived[..], hex(&draft["derived"]));
 }

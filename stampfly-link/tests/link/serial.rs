@@ -1,6 +1,7 @@
 //! Frames of radio receivers, from other people's tests and from the formats' descriptions: read, written again bit for bit, and refused when
 //! a bit is wrong.
 
+use crate::hex::hex;
 use serde_json::Value;
 use stampfly_link::serial::Channels;
 use stampfly_link::serial::crsf::{CrsfDecoder, CrsfFrame, LinkStatistics, Message};
@@ -12,14 +13,9 @@ use stampfly_link::types::{Duration, Instant};
 fn frames(protocol: &str) -> Vec<(Value, Vec<u8>)> {
     let vectors: Value = serde_json::from_str(include_str!("../vectors/rc_serial.json")).expect("well-formed");
     let frames = vectors[protocol]["frames"].as_array().expect("frames").clone();
-    let found: Vec<_> = frames.into_iter().map(|frame| (hex(frame["hex"].as_str().expect("hex")), frame)).collect();
+    let found: Vec<_> = frames.into_iter().map(|frame| (hex(&frame["hex"]), frame)).collect();
     assert!(found.len() >= 4, "{protocol}");
     found.into_iter().map(|(bytes, frame)| (frame, bytes)).collect()
-}
-
-fn hex(text: &str) -> Vec<u8> {
-    let digits: Vec<_> = text.chars().map(|digit| digit.to_digit(16).expect("a digit") as u8).collect();
-    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }
 
 fn numbers(value: &Value) -> Vec<u16> {

@@ -1,5 +1,6 @@
 //! The data stream: bytes by hand from the tables, what does not fit, and that nothing else is taken for a packet.
 
+use crate::hex::hex;
 use proptest::prelude::*;
 use serde_json::Value;
 use stampfly_link::stream::{
@@ -406,10 +407,4 @@ fn packets_that_another_program_has_packed_mean_what_it_meant() {
     assert_eq!(present.gains, Some(StreamGains { rate, current: Some(812.5) }));
     assert_eq!(with_gains, StreamStatus { gains: Some(StreamGains { rate, current: None }), ..present });
     assert_eq!(oldest, StreamStatus { gains: None, ..present });
-}
-
-fn hex(value: &Value) -> Vec<u8> {
-    let digits: Vec<u8> =
-        value.as_str().expect("hex").chars().map(|digit| digit.to_digit(16).expect("a digit") as u8).collect();
-    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }
