@@ -2,7 +2,8 @@
 //!
 //! Messages are mostly framed soundly here, because a checksum stops nearly all bytes that are drawn, and what is behind it would not be reached.
 
-#[path = "../../stampfly-services/tests/common/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../../stampfly-services/tests/services/common.rs"]
 mod common;
 
 use crate::Input;

@@ -3,6 +3,7 @@
 //! `cargo xtask loom`. Each model counts the executions it explored and asserts a floor, because a model that explores
 //! one interleaving passes whatever the code does. Each has a twin from which one ordering, or one cursor, is taken
 //! out; the twin must fail. All actors are spawned, none is the model's own closure: loom explores that one too little.
+// A program of its own: it is built with `--cfg loom`.
 #![cfg(loom)]
 
 use loom::thread;

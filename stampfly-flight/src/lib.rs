@@ -77,6 +77,6 @@ pub use watchdog::Watchdog;
 
 /// The vehicle that the tests run.
 #[cfg(test)]
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/flight/common/mod.rs"]
 #[allow(dead_code, reason = "each test uses a part")]
 mod rover;

@@ -11,8 +11,8 @@ use stampfly_types::{ActivationRecord, Instant, Message, Stamped};
 /// The tables of a vehicle in the hands of a test. Topics and runnables go by their names.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::{Rover, topics}; // the rover of `tests/common`, configured by a gain
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::{Rover, topics}; // the rover of `tests/flight/common`, configured by a gain
 /// use stampfly_flight::Mock;
 /// use stampfly_types::{Instant, messages::{FlightStatus, MotorOutput, TofData}};
 ///

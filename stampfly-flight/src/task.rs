@@ -33,8 +33,8 @@ const IDLE: Duration = Duration::from_millis(10);
 /// executor that wakes this one, as a [`Hook`](stampfly_bus::Hook) on the bus can do.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::{Rover, topics}; // the rover of `tests/common`
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::{Rover, topics}; // the rover of `tests/flight/common`
 /// use stampfly_flight::{Assembled, FlightLoop, task::fly};
 /// use stampfly_types::{Instant, messages::TofData};
 /// # use embedded_hal_async::delay::DelayNs;

@@ -41,7 +41,7 @@ type NoCache = Cache<Uncached, Uncached, Uncached, u32>;
 /// Values with names, in flash. On a flash that blocks: [`blocking::ParameterStore`](crate::blocking::ParameterStore).
 ///
 /// ```
-/// # #[path = "../tests/flash/mod.rs"] mod flash;
+/// # #[path = "../tests/param/flash.rs"] mod flash;
 /// # use flash::Flash;
 /// use embassy_futures::block_on;
 /// use stampfly_param::{Disarmed, LoadError, ParameterStore, Kind};

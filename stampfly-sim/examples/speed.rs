@@ -3,7 +3,7 @@
 //! Flies one vehicle with every sensor read by a task of its own and a small controller on the truth, for a minute of
 //! simulated time, and prints the machine time one 2.5 ms control period costs.
 
-#[path = "../tests/hover/pilot.rs"]
+#[path = "../tests/sim/pilot.rs"]
 mod pilot;
 
 use stampfly_drivers::{Barometer, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder};

@@ -71,8 +71,8 @@ impl core::error::Error for DumpError {}
 /// memory is needed for the log. The last line is `end of log: ` and how many lines and bytes came before it.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::topics; // the rover of `tests/common`
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::topics; // the rover of `tests/flight/common`
 /// use stampfly_flight::black_box::{BlackBox, LogRate, Retention, dump};
 /// use stampfly_log::ulog::{Definitions, Topic};
 /// use stampfly_types::{Instant, messages::TofData, Message};

@@ -10,8 +10,8 @@ use stampfly_types::Instant;
 /// with the version of the firmware.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::Rover; // the rover of `tests/common`
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::Rover; // the rover of `tests/flight/common`
 /// use stampfly_flight::black_box::open;
 /// use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 /// use stampfly_log::ulog::Ram;

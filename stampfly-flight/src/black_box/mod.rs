@@ -56,8 +56,8 @@ pub struct Changed;
 /// that has been disarmed for longer than [`TAIL`].
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::topics::{self, Id}; // the rover of `tests/common`
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::topics::{self, Id}; // the rover of `tests/flight/common`
 /// use stampfly_flight::black_box::{BlackBox, LogRate, Retention};
 /// use stampfly_flight::newest::message;
 /// use stampfly_types::messages::{FlightStatus, TofData};

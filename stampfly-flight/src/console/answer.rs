@@ -32,8 +32,8 @@ pub enum Request<R> {
 /// Answers a line. The reply's lines end with a carriage return and a line feed, as terminals want it.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::topics; // the rover of `tests/common`
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::topics; // the rover of `tests/flight/common`
 /// use core::fmt;
 /// use stampfly_bus::TopicInfo;
 /// use stampfly_flight::console::{CommandError, Request, SensorLine, Vehicle, answer};

@@ -84,8 +84,8 @@ pub const fn stack_size<R: Schedule>() -> usize {
 /// still be rounding.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::{Rover, topics::{Bus, Id}}; // the rover of `tests/common`, configured by a gain
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::{Rover, topics::{Bus, Id}}; // the rover of `tests/flight/common`, configured by a gain
 /// use stampfly_flight::golden::{Verdict, Writer, play, tables};
 /// use stampfly_types::{Instant, Message, messages::{MotorOutput, TofData}};
 ///

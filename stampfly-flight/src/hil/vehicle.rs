@@ -136,8 +136,8 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 /// and in no other way.
 ///
 /// ```
-/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/mod.rs")); }
-/// use rover::{Rover, topics::{Bus, Id, TOPICS}}; // the rover of `tests/common`, configured by a gain
+/// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
+/// use rover::{Rover, topics::{Bus, Id, TOPICS}}; // the rover of `tests/flight/common`, configured by a gain
 /// use core::mem::MaybeUninit;
 /// use stampfly_flight::golden::tables;
 /// use stampfly_flight::hil::{Bands, Entries, Flight, Greeting, LONGEST, LONGEST_FRAME, Line, Log, Over, Request, greet};

@@ -10,7 +10,7 @@
 //! record, where white noise goes in and the chain's own shape comes out. The flight holds manoeuvres, so it is
 //! compared above 10 Hz for the accelerometer and above 30 Hz for the gyroscope.
 
-#[path = "../../../stampfly-sim/tests/hover/pilot.rs"]
+#[path = "../../../stampfly-sim/tests/sim/pilot.rs"]
 mod pilot;
 mod plot;
 mod recording;

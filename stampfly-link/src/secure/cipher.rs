@@ -1,7 +1,7 @@
 //! ChaCha20-Poly1305 (RFC 8439) and the derivation of keys, put together of the crates `chacha20` and `poly1305`.
 //!
 //! The crate `chacha20poly1305` does the same; it unwraps inside, and so a program that links it links a panic handler.
-//! What is put together here is compared with it and with Python's `cryptography` in `tests/secure_vectors.rs`. The tag is
+//! What is put together here is compared with it and with Python's `cryptography` in `tests/link/secure_vectors.rs`. The tag is
 //! compared by `poly1305`, in constant time.
 
 use chacha20::cipher::{KeyIvInit, StreamCipher};

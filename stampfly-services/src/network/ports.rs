@@ -39,7 +39,7 @@ pub trait Door {
 
 /// What is spoken at the ports.
 ///
-/// `examples/ports.rs` has it on a computer's sockets, `tests/network.rs` on a [`Stack`](super::Stack).
+/// `examples/ports.rs` has it on a computer's sockets, `tests/services/network` on a [`Stack`](super::Stack).
 #[derive(Clone, Debug)]
 pub struct Ports<const ITEMS: usize> {
     mavlink: Mavlink<Client, CLIENTS, ITEMS>,

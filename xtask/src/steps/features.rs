@@ -28,7 +28,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 /// What a feature adds that does something by itself.
 const TESTED: [&[&str]; 2] = [
     // A clock that can be asked on this PC, too.
-    &["-p", "stampfly-driver-core", "--features", "embassy-time", "--test", "embassy"],
+    &["-p", "stampfly-driver-core", "--features", "embassy-time", "--test", "driver-core", "embassy"],
     &["-p", "stampfly-bus", "--features", "async", "bell"],
 ];
 

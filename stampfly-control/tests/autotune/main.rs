@@ -1,8 +1,0 @@
-//! Tuning in closed loop, against vehicles that it does not know.
-//!
-//! `cargo test -p stampfly-control --test autotune -- --nocapture` prints the figures.
-
-mod found;
-mod plant;
-mod stops;
-mod vehicle;

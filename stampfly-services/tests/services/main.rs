@@ -1,0 +1,15 @@
+//! A vehicle's end of every conversation. One binary, because each would link the crate `mavlink` again:
+//! `cargo test -p stampfly-services --test services mission` runs one file.
+
+mod cable;
+mod common;
+mod desk;
+#[cfg(feature = "mavlink")]
+mod mavlink;
+#[cfg(feature = "mavlink")]
+mod mission;
+mod msp;
+#[cfg(feature = "network")]
+mod network;
+mod streams;
+mod tello;

@@ -1,0 +1,490 @@
+//! The vehicle's end of MAVLink, asked by a ground station made of the crate `mavlink` alone.
+
+use crate::common::{Id, Vehicle};
+use stampfly_link::mavlink::dialects::common::*;
+use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
+use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};
+use stampfly_services::{Request, Seat};
+use stampfly_types::messages::{
+    Alerts, ArmBlocks, CalibrationKind, CalibrationReport, CalibrationStage, GuidedKind, SystemAlert,
+};
+use stampfly_types::{Instant, Vec3};
+
+const IDENTITY: Identity =
+    Identity { system: 7, kind: MavType::MAV_TYPE_QUADROTOR, take_off_height: 0.5, reach: 0.25, version: [1, 2, 3] };
+
+/// A ground station at a line of its own.
+struct Station {
+    id: u8,
+    writer: MavlinkWriter,
+    decoder: MavlinkDecoder<MavMessage>,
+    heard: Vec<MavMessage>,
+}
+
+impl Station {
+    fn new(id: u8) -> Self {
+        Self { id, writer: MavlinkWriter::new(250 + id % 6, 190), decoder: MavlinkDecoder::new(), heard: Vec::new() }
+    }
+
+    fn says(&mut self, message: &MavMessage) -> Vec<u8> {
+        let mut bytes = [0; LONGEST];
+        self.writer.write(MavlinkVersion::V1, message, &mut bytes).expect("of version 1").to_vec()
+    }
+
+    fn hears(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.heard.extend(self.decoder.feed(*byte).map(|frame| frame.message::<MavMessage>().expect("a message")));
+        }
+    }
+
+    /// What came back at once.
+    fn asks(
+        &mut self,
+        now: Instant,
+        mavlink: &mut Mavlink<u8>,
+        vehicle: &mut Vehicle,
+        message: &MavMessage,
+    ) -> Vec<MavMessage> {
+        let (bytes, id) = (self.says(message), self.id);
+        let mut sent = Vec::new();
+        mavlink.hear(now, id, &bytes, vehicle, &mut |to, frame| {
+            assert_eq!(*to, id);
+            sent.extend(frame);
+        });
+        self.heard.clear();
+        self.hears(&sent);
+        std::mem::take(&mut self.heard)
+    }
+}
+
+fn command(kind: MavCmd, parameters: [f32; 7]) -> MavMessage {
+    let [param1, param2, param3, param4, param5, param6, param7] = parameters;
+    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1,
+        param2,
+        param3,
+        param4,
+        param5,
+        param6,
+        param7,
+        command: kind,
+        target_system: 7,
+        target_component: 1,
+        confirmation: 0,
+    })
+}
+
+fn result(answers: &[MavMessage]) -> Option<MavResult> {
+    answers.iter().find_map(|answer| match answer {
+        MavMessage::COMMAND_ACK(ack) => Some(ack.result),
+        _ => None,
+    })
+}
+
+fn arm() -> MavMessage {
+    command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+}
+
+/// Polls for so long, 50 times a second, and returns what each client was sent.
+fn polled(mavlink: &mut Mavlink<u8>, vehicle: &mut Vehicle, from_ms: u64, to_ms: u64) -> Vec<(u8, MavMessage)> {
+    let mut sent: Vec<(u8, Vec<u8>)> = Vec::new();
+    for ms in (from_ms..to_ms).step_by(20) {
+        mavlink.poll(Instant::from_millis(ms), vehicle, &mut |to, frame| sent.push((*to, frame.to_vec())));
+    }
+    let mut messages = Vec::new();
+    for (to, frame) in sent {
+        let mut station = Station::new(to);
+        station.hears(&frame);
+        messages.extend(station.heard.drain(..).map(|message| (to, message)));
+    }
+    messages
+}
+
+#[test]
+fn a_client_that_says_nothing_is_sent_heartbeats_and_streams_at_their_rates() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::standing());
+    mavlink.open(Instant::ZERO, 1, true);
+    let sent = polled(&mut mavlink, &mut vehicle, 0, 10_000);
+    let count = |wanted: fn(&MavMessage) -> bool| sent.iter().filter(|(_, message)| wanted(message)).count();
+    assert_eq!(count(|message| matches!(message, MavMessage::HEARTBEAT(_))), 10);
+    assert_eq!(count(|message| matches!(message, MavMessage::EXTENDED_SYS_STATE(_))), 20);
+    let attitudes = count(|message| matches!(message, MavMessage::ATTITUDE(_)));
+    assert!((190..=200).contains(&attitudes), "{attitudes}");
+    assert_eq!(count(|message| matches!(message, MavMessage::DISTANCE_SENSOR(_))), 0, "no range was ever measured");
+}
+
+#[test]
+fn arming_is_denied_with_the_reasons_in_words_and_passed_on_when_there_are_none() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    vehicle.status(|status| status.blocks = ArmBlocks::TILTED | ArmBlocks::NO_BATTERY);
+    let answers = station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &arm());
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_DENIED));
+    let texts: Vec<_> = answers
+        .iter()
+        .filter_map(|answer| match answer {
+            MavMessage::STATUSTEXT(text) => Some(text.text.to_str().expect("text").to_owned()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(texts, ["not armed: NO_BATTERY", "not armed: TILTED"]);
+    assert!(vehicle.guided.is_empty());
+
+    vehicle.status(|status| status.blocks = ArmBlocks::NONE);
+    let answers = station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &arm());
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_ACCEPTED));
+    assert_eq!(vehicle.guided.iter().map(|command| command.kind).collect::<Vec<_>>(), [GuidedKind::Arm]);
+}
+
+#[test]
+fn what_is_for_another_system_or_is_no_number_does_nothing() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let MavMessage::COMMAND_LONG(land) = command(MavCmd::MAV_CMD_NAV_LAND, [0.0; 7]) else { unreachable!() };
+    for (target_system, target_component) in [(8, 1), (7, 2)] {
+        let land = COMMAND_LONG_DATA { target_system, target_component, ..land.clone() };
+        assert_eq!(station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &MavMessage::COMMAND_LONG(land)), []);
+    }
+    for wrong in [f32::NAN, f32::INFINITY, 1e6] {
+        let mut target =
+            SET_POSITION_TARGET_LOCAL_NED_DATA { target_system: 7, target_component: 1, ..Default::default() };
+        (target.x, target.coordinate_frame) = (wrong, MavFrame::MAV_FRAME_LOCAL_NED);
+        target.type_mask = PositionTargetTypemask::empty();
+        station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &MavMessage::SET_POSITION_TARGET_LOCAL_NED(target));
+        let motor = command(MavCmd::MAV_CMD_DO_MOTOR_TEST, [wrong, 0.0, wrong, 0.0, 0.0, 0.0, 0.0]);
+        station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &motor);
+    }
+    assert_eq!(vehicle.guided, [], "a place that is none does not even cost the route");
+    assert_eq!(vehicle.requests, []);
+    // Everybody is meant by zero.
+    let everybody = COMMAND_LONG_DATA { target_system: 0, target_component: 0, ..land };
+    let answers = station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &MavMessage::COMMAND_LONG(everybody));
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_ACCEPTED));
+}
+
+#[test]
+fn a_target_that_is_repeated_is_passed_on_once() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let mut target = SET_POSITION_TARGET_LOCAL_NED_DATA { target_system: 7, target_component: 1, ..Default::default() };
+    (target.x, target.z, target.coordinate_frame) = (1.0, -0.5, MavFrame::MAV_FRAME_LOCAL_NED);
+    target.type_mask = PositionTargetTypemask::POSITION_TARGET_TYPEMASK_YAW_IGNORE;
+    for ms in 0..50 {
+        let message = MavMessage::SET_POSITION_TARGET_LOCAL_NED(target.clone());
+        station.asks(Instant::from_millis(20 * ms), &mut mavlink, &mut vehicle, &message);
+    }
+    let kinds: Vec<_> = vehicle.guided.iter().map(|command| command.kind).collect();
+    assert_eq!(kinds, [GuidedKind::Hold, GuidedKind::WayPoint]);
+    assert_eq!(vehicle.guided[1].position, Vec3::new(1.0, 0.0, -0.5));
+}
+
+#[test]
+fn two_stations_do_not_steer_one_vehicle_but_both_can_stop_it() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::flying());
+    let (mut first, mut second) = (Station::new(1), Station::new(2));
+    let hold = command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]);
+    let mut ask = |station: &mut Station, message: &MavMessage| {
+        result(&station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, message))
+    };
+    assert_eq!(ask(&mut first, &hold), Some(MavResult::MAV_RESULT_ACCEPTED));
+    assert_eq!(ask(&mut second, &hold), Some(MavResult::MAV_RESULT_NOT_IN_CONTROL));
+    assert_eq!(ask(&mut second, &command(MavCmd::MAV_CMD_NAV_LAND, [0.0; 7])), Some(MavResult::MAV_RESULT_ACCEPTED));
+    let stop = command(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(ask(&mut second, &stop), Some(MavResult::MAV_RESULT_ACCEPTED));
+    assert_eq!(vehicle.guided.last().map(|command| command.kind), Some(GuidedKind::Kill));
+}
+
+#[test]
+fn parameters_are_listed_read_and_set_within_their_range_on_the_ground() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let list = PARAM_REQUEST_LIST_DATA { target_system: 7, target_component: 1 };
+    station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &MavMessage::PARAM_REQUEST_LIST(list));
+    let listed: Vec<_> = polled(&mut mavlink, &mut vehicle, 0, 100)
+        .into_iter()
+        .filter_map(|(_, message)| match message {
+            MavMessage::PARAM_VALUE(value) => {
+                Some((value.param_id.to_str().expect("text").to_owned(), value.param_count))
+            }
+            _ => None,
+        })
+        .collect();
+    let long = short_name("a.name.that.is.longer.than.sixteen");
+    assert_eq!(listed, [("gain".to_owned(), 2), (long.to_string(), 2)]);
+
+    let mut set = |vehicle: &mut Vehicle, name: &str, value: f32| {
+        let set = PARAM_SET_DATA {
+            param_value: value,
+            target_system: 7,
+            target_component: 1,
+            param_id: name.into(),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        };
+        let answers = station.asks(Instant::ZERO, &mut mavlink, vehicle, &MavMessage::PARAM_SET(set));
+        answers.into_iter().find_map(|answer| match answer {
+            MavMessage::PARAM_VALUE(value) => Some(value.param_value),
+            _ => None,
+        })
+    };
+    assert_eq!(set(&mut vehicle, "gain", 3.0), Some(3.0));
+    assert_eq!(set(&mut vehicle, "gain", 11.0), Some(3.0), "out of range");
+    assert_eq!(set(&mut vehicle, "gain", f32::NAN), Some(3.0), "no number");
+    assert_eq!(set(&mut vehicle, &long, 4.0), Some(4.0));
+    assert_eq!(set(&mut vehicle, "nonsense", 4.0), None);
+    vehicle.status(|status| status.armed = true);
+    assert_eq!(set(&mut vehicle, "gain", 5.0), Some(5.0), "may change in flight");
+    assert_eq!(set(&mut vehicle, "gain", 11.0), Some(5.0), "as far as its range goes");
+    assert_eq!(vehicle.parameters.0, [5.0, 4.0]);
+}
+
+#[test]
+fn what_may_not_change_in_flight_is_taken_and_said_to_wait() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let set = |name: &str, value| {
+        let mut param_id = [0; 16];
+        param_id.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+        MavMessage::PARAM_SET(PARAM_SET_DATA {
+            param_value: value,
+            target_system: 7,
+            target_component: 1,
+            param_id: param_id.into(),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        })
+    };
+    let mut texts = |vehicle: &mut Vehicle, message: &MavMessage| {
+        let answers = station.asks(Instant::from_millis(10), &mut mavlink, vehicle, message);
+        answers.iter().fold(String::new(), |said, answer| match answer {
+            MavMessage::STATUSTEXT(text) => said + text.text.to_str().expect("UTF-8"),
+            _ => said,
+        })
+    };
+    let long = "a.name.that.is.longer.than.sixteen";
+    let said = texts(&mut vehicle, &set(&short_name(long), 4.0));
+    assert_eq!(said, format!("{long}: not in flight: waits until the vehicle is disarmed"));
+    assert_eq!(texts(&mut vehicle, &set("gain", 4.0)), "");
+    assert_eq!(vehicle.parameters.0, [4.0, 4.0]);
+}
+
+#[test]
+fn a_combination_that_cannot_fly_keeps_the_old_value_and_says_why_in_pieces() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    vehicle.parameters.0 = [3.0, 9.0];
+    let set = PARAM_SET_DATA {
+        param_value: 7.0,
+        target_system: 7,
+        target_component: 1,
+        param_id: "gain".into(),
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+    };
+    let (mut values, mut pieces) = (Vec::new(), Vec::new());
+    for answer in station.asks(Instant::from_millis(10), &mut mavlink, &mut vehicle, &MavMessage::PARAM_SET(set)) {
+        match answer {
+            MavMessage::PARAM_VALUE(value) => values.push(value.param_value),
+            MavMessage::STATUSTEXT(piece) => pieces.push(piece),
+            _ => {}
+        }
+    }
+    assert_eq!((values, vehicle.parameters.0), (vec![3.0], [3.0, 9.0]));
+    let text: String = pieces.iter().map(|piece| piece.text.to_str().expect("text")).collect();
+    assert_eq!(text, "gain with a.name.that.is.longer.than.sixteen: seven and nine never fly together, on no day");
+    let places: Vec<_> = pieces.iter().map(|piece| (piece.id, piece.chunk_seq)).collect();
+    assert!(places[0].0 != 0 && places == [(places[0].0, 0), (places[0].0, 1)], "{places:?}");
+}
+
+#[test]
+fn an_alert_is_told_once_and_again_when_it_comes_back() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::flying());
+    mavlink.open(Instant::ZERO, 1, true);
+    let mut told = |vehicle: &mut Vehicle, active, from| {
+        vehicle.publish(Id::system_alert, &SystemAlert { active, seen: active });
+        let sent = polled(&mut mavlink, vehicle, from, from + 200);
+        sent.iter().filter(|(_, message)| matches!(message, MavMessage::STATUSTEXT(_))).count()
+    };
+    assert_eq!(told(&mut vehicle, Alerts::TOF_LOST | Alerts::FLOW_LOST, 0), 2);
+    assert_eq!(told(&mut vehicle, Alerts::TOF_LOST | Alerts::FLOW_LOST, 200), 0);
+    assert_eq!(told(&mut vehicle, Alerts::NONE, 400), 0);
+    assert_eq!(told(&mut vehicle, Alerts::TOF_LOST, 600), 1);
+}
+
+#[test]
+fn there_is_room_for_eight_clients_and_those_that_fall_silent_make_room() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::standing());
+    for id in 0..=CLIENTS as u8 {
+        let mut station = Station::new(id);
+        let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+        station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &heartbeat);
+    }
+    assert_eq!(mavlink.refused(), 1);
+    assert_eq!(vehicle.alive.len(), CLIENTS);
+    assert!(matches!(vehicle.alive.first(), Some(Seat::Mavlink(_))));
+    polled(&mut mavlink, &mut vehicle, 40_000, 40_020);
+    let mut late = Station::new(99);
+    late.asks(Instant::from_secs(41), &mut mavlink, &mut vehicle, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    assert_eq!(mavlink.refused(), 1);
+}
+
+#[test]
+fn an_interval_is_changed_and_put_back_and_a_message_is_sent_when_asked_for() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let interval =
+        |id: f32, micros: f32| command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, [id, micros, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut set = |vehicle: &mut Vehicle, mavlink: &mut Mavlink<u8>, id, micros| {
+        result(&station.asks(Instant::ZERO, mavlink, vehicle, &interval(id, micros)))
+    };
+    let attitudes = |mavlink: &mut Mavlink<u8>, vehicle: &mut Vehicle, from| {
+        let sent = polled(mavlink, vehicle, from, from + 1_000);
+        sent.iter().filter(|(_, message)| matches!(message, MavMessage::ATTITUDE(_))).count()
+    };
+    assert_eq!(set(&mut vehicle, &mut mavlink, 30.0, 1.0), Some(MavResult::MAV_RESULT_ACCEPTED));
+    assert_eq!(attitudes(&mut mavlink, &mut vehicle, 0), 50, "as often as it is polled, not more");
+    assert_eq!(set(&mut vehicle, &mut mavlink, 30.0, -1.0), Some(MavResult::MAV_RESULT_ACCEPTED));
+    assert_eq!(attitudes(&mut mavlink, &mut vehicle, 1_000), 0);
+    assert_eq!(set(&mut vehicle, &mut mavlink, 30.0, f32::NAN), Some(MavResult::MAV_RESULT_DENIED));
+    assert_eq!(set(&mut vehicle, &mut mavlink, 9_999.0, 0.0), Some(MavResult::MAV_RESULT_UNSUPPORTED));
+
+    let version = command(MavCmd::MAV_CMD_REQUEST_MESSAGE, [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let answers = station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &version);
+    let found = answers.iter().find_map(|answer| match answer {
+        MavMessage::AUTOPILOT_VERSION(version) => Some(version.flight_sw_version),
+        _ => None,
+    });
+    assert_eq!(found, Some(0x0102_03FF));
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_ACCEPTED));
+}
+
+#[test]
+fn a_motor_is_tested_in_per_cent_and_stopped_with_none() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    for share in [10.0, 0.0] {
+        let test = command(MavCmd::MAV_CMD_DO_MOTOR_TEST, [2.0, 0.0, share, 1.0, 0.0, 0.0, 0.0]);
+        station.asks(Instant::ZERO, &mut mavlink, &mut vehicle, &test);
+    }
+    assert_eq!(vehicle.requests, [Request::TestMotor { motor: 2, duty: 0.1 }, Request::StopMotor]);
+}
+
+#[test]
+fn bytes_of_strangers_are_answered_by_nothing() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::flying());
+    let mut word = 1_u32;
+    let noise: Vec<u8> = (0..100_000)
+        .map(|_| {
+            // xorshift
+            word ^= word << 13;
+            word ^= word >> 17;
+            word ^= word << 5;
+            if word.is_multiple_of(5) { 0xFD } else { (word >> 9) as u8 }
+        })
+        .collect();
+    for part in noise.chunks(97) {
+        mavlink.hear(Instant::ZERO, 1, part, &mut vehicle, &mut |_, frame| panic!("{frame:02x?}"));
+    }
+    assert!(vehicle.guided.is_empty() && vehicle.steered.is_empty() && vehicle.alive.is_empty());
+}
+
+/// Texts of a station, and results of the calibration command with their progress.
+fn calibration_of(of: u8, sent: &[(u8, MavMessage)]) -> (Vec<String>, Vec<(MavResult, u8)>) {
+    let (mut texts, mut results) = (Vec::new(), Vec::new());
+    for (_, message) in sent.iter().filter(|(to, _)| *to == of) {
+        match message {
+            MavMessage::STATUSTEXT(text) if text.chunk_seq == 0 => {
+                texts.push(text.text.to_str().expect("UTF-8").to_owned())
+            }
+            MavMessage::COMMAND_ACK(ack) if ack.command == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION => {
+                results.push((ack.result, ack.progress));
+            }
+            _ => {}
+        }
+    }
+    (texts, results)
+}
+
+/// A vehicle whose level is being calibrated for station 1, with a second station beside it.
+fn calibrating() -> (Mavlink<u8>, Vehicle, Station) {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let level = command(MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION, [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    let now = Instant::from_millis(20);
+    let answers = station.asks(now, &mut mavlink, &mut vehicle, &level);
+    let (texts, results) =
+        calibration_of(1, &answers.into_iter().map(|answer| (1, answer)).collect::<Vec<(u8, MavMessage)>>());
+    assert_eq!(results, [(MavResult::MAV_RESULT_IN_PROGRESS, u8::MAX)]);
+    assert_eq!(texts[0], "[cal] calibration started: 2 level");
+    assert_eq!(vehicle.requests, [Request::Calibrate(CalibrationKind::Level)]);
+    // Asked again, because the acknowledgement was lost: it goes on.
+    assert_eq!(result(&station.asks(now, &mut mavlink, &mut vehicle, &level)), Some(MavResult::MAV_RESULT_IN_PROGRESS));
+    let mut other = Station::new(2);
+    let answers = other.asks(now, &mut mavlink, &mut vehicle, &level);
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
+    assert_eq!(vehicle.requests.len(), 1);
+    (mavlink, vehicle, station)
+}
+
+fn report(stage: CalibrationStage, progress: f32) -> CalibrationReport {
+    CalibrationReport { kind: CalibrationKind::Level, stage, progress, ..Default::default() }
+}
+
+#[test]
+fn a_calibration_is_in_progress_until_it_is_done_and_is_then_taken() {
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    // What an earlier one has found is none of this one's.
+    vehicle.publish_at(Instant::from_millis(10), Id::calibration_report, &report(CalibrationStage::Done, 1.0));
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 40, 200));
+    assert_eq!((results, vehicle.requests.len()), (vec![], 1));
+    vehicle.publish_at(Instant::from_millis(200), Id::calibration_report, &report(CalibrationStage::Running, 0.4));
+    let sent = polled(&mut mavlink, &mut vehicle, 200, 2_220);
+    let (texts, results) = calibration_of(1, &sent);
+    assert_eq!(results, [(MavResult::MAV_RESULT_IN_PROGRESS, 40); 5], "twice a second, and at once");
+    assert_eq!(texts[1], "[cal] progress <40>");
+    assert!(texts[0].starts_with("[cal] level: 40 %"), "{texts:?}");
+    assert_eq!(calibration_of(2, &sent), (vec![], vec![]), "nothing of that is for others");
+    let found = report(CalibrationStage::Done, 1.0);
+    vehicle.publish_at(Instant::from_millis(2_300), Id::calibration_report, &found);
+    let (texts, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 2_300, 4_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_ACCEPTED, 100)]);
+    assert_eq!(texts.last().expect("a text"), "[cal] calibration done: level");
+    assert_eq!(vehicle.requests[1..], [Request::AcceptCalibration(found)]);
+}
+
+#[test]
+fn a_calibration_that_ends_otherwise_is_not_taken_and_says_so() {
+    for (stage, expected, text) in [
+        (CalibrationStage::Cancelled, MavResult::MAV_RESULT_CANCELLED, "[cal] calibration cancelled"),
+        (CalibrationStage::Armed, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+        (CalibrationStage::TimedOut, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+        (CalibrationStage::Implausible, MavResult::MAV_RESULT_FAILED, "[cal] calibration failed: level"),
+    ] {
+        let (mut mavlink, mut vehicle, _) = calibrating();
+        vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &report(stage, 0.5));
+        let (texts, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000));
+        assert_eq!((results, vehicle.requests.len()), (vec![(expected, 100)], 1), "{stage:?}");
+        assert_eq!(texts.last().expect("a text"), text);
+    }
+    // Somebody at the command line has begun another one.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    let other = CalibrationReport { kind: CalibrationKind::Magnetometer, ..report(CalibrationStage::Running, 0.1) };
+    vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &other);
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_CANCELLED, 100)]);
+    // A vehicle that says nothing.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    let (_, results) = calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 5_000));
+    assert_eq!(results, [(MavResult::MAV_RESULT_FAILED, 0)]);
+    // Whoever has asked is gone: nothing is taken.
+    let (mut mavlink, mut vehicle, _) = calibrating();
+    mavlink.close(1);
+    vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &report(CalibrationStage::Done, 1.0));
+    assert_eq!(calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000)), (vec![], vec![]));
+    assert_eq!(vehicle.requests.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_said_in_words_and_nothing_cancels_everything() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::standing(), Station::new(1));
+    let mut ask = |vehicle: &mut Vehicle, parameters| {
+        let command = command(MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION, parameters);
+        let answers = station.asks(Instant::from_millis(20), &mut mavlink, vehicle, &command);
+        (result(&answers).expect("an answer"), answers.len() > 1)
+    };
+    let gyro = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert_eq!(ask(&mut vehicle, gyro), (MavResult::MAV_RESULT_UNSUPPORTED, true));
+    let both = [0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0];
+    assert_eq!(ask(&mut vehicle, both), (MavResult::MAV_RESULT_DENIED, false));
+    assert_eq!(vehicle.requests, []);
+    assert_eq!(ask(&mut vehicle, [0.0; 7]), (MavResult::MAV_RESULT_ACCEPTED, false));
+    assert_eq!(vehicle.requests, [Request::Calibrate(CalibrationKind::None)]);
+}

@@ -1,0 +1,190 @@
+//! A Tello's commands: what is answered when, and what the vehicle is asked for.
+
+use crate::common::{Id, Vehicle};
+use stampfly_services::Tello;
+use stampfly_services::tello::Destination;
+use stampfly_types::messages::{ArmBlocks, FlightPhase, GuidedKind, Setpoint, SetpointAxes, StateEstimate, Validity};
+use stampfly_types::{Instant, Quat, Vec3};
+
+/// A program, the service and the vehicle, a moment at a time.
+struct Talk {
+    tello: Tello<u8>,
+    vehicle: Vehicle,
+    now: Instant,
+    said: Vec<(u8, String)>,
+    states: usize,
+}
+
+impl Talk {
+    fn new(vehicle: Vehicle) -> Self {
+        Self { tello: Tello::new(), vehicle, now: Instant::ZERO, said: Vec::new(), states: 0 }
+    }
+
+    fn hear(&mut self, program: u8, text: &str) -> Vec<String> {
+        let Self { tello, vehicle, now, said, .. } = self;
+        tello.hear(*now, program, text.as_bytes(), vehicle, &mut |to, what, bytes| {
+            assert_eq!(what, Destination::Program);
+            said.push((*to, String::from_utf8(bytes.to_vec()).expect("text")));
+        });
+        self.answers()
+    }
+
+    /// So many turns of 20 ms.
+    fn wait(&mut self, turns: u64) -> Vec<String> {
+        for _ in 0..turns {
+            self.now = Instant::from_micros(self.now.as_micros() + 20_000);
+            let Self { tello, vehicle, now, said, states, .. } = self;
+            tello.poll(*now, vehicle, &mut |to, what, bytes| match what {
+                Destination::Program => said.push((*to, String::from_utf8(bytes.to_vec()).expect("text"))),
+                Destination::State => *states += 1,
+            });
+        }
+        self.answers()
+    }
+
+    fn answers(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.said).into_iter().map(|(_, text)| text).collect()
+    }
+
+    fn kinds(&self) -> Vec<GuidedKind> {
+        self.vehicle.guided.iter().map(|command| command.kind).collect()
+    }
+
+    fn is_at(&mut self, position: Vec3, yaw: f32) {
+        let valid = Validity::TILT | Validity::POSITION_XY | Validity::POSITION_Z;
+        let attitude = Quat::from_euler_angles(0.0, 0.0, yaw);
+        self.vehicle.publish(Id::estimate_state, &StateEstimate { position, attitude, valid, ..Default::default() });
+        let axes = SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z | SetpointAxes::YAW;
+        self.vehicle.publish(Id::setpoint, &Setpoint { position, yaw, axes, ..Default::default() });
+    }
+}
+
+#[test]
+fn a_take_off_waits_for_the_calibration_and_is_answered_in_the_air() {
+    let mut talk = Talk::new(Vehicle::standing());
+    talk.vehicle.status(|status| status.blocks = ArmBlocks::CALIBRATING);
+    assert_eq!(talk.hear(1, "takeoff"), ["error say command first"]);
+    assert_eq!(talk.hear(1, "command"), ["ok"]);
+    assert_eq!(talk.hear(1, "takeoff"), Vec::<String>::new());
+    assert_eq!(talk.wait(100), Vec::<String>::new());
+    assert_eq!(talk.kinds(), []);
+    talk.vehicle.status(|status| status.blocks = ArmBlocks::NONE);
+    talk.wait(20);
+    assert_eq!(talk.kinds(), [GuidedKind::Arm]);
+    talk.vehicle.status(|status| (status.phase, status.armed) = (FlightPhase::Armed, true));
+    talk.wait(20);
+    assert_eq!(talk.kinds(), [GuidedKind::Arm, GuidedKind::TakeOff]);
+    assert_eq!(talk.hear(1, "forward 50"), ["error busy"]);
+    talk.vehicle.status(|status| status.phase = FlightPhase::Flying);
+    assert_eq!(talk.wait(20), ["ok"]);
+    assert!(talk.states > 20, "the state is sent meanwhile: {}", talk.states);
+}
+
+#[test]
+fn what_keeps_it_on_the_ground_is_said() {
+    let mut talk = Talk::new(Vehicle::standing());
+    talk.vehicle.status(|status| status.blocks = ArmBlocks::LOW_BATTERY);
+    talk.hear(1, "command");
+    talk.hear(1, "takeoff");
+    assert_eq!(talk.wait(500), ["error LOW_BATTERY"]);
+}
+
+#[test]
+fn a_move_is_flown_as_the_vehicle_looks_and_answered_when_it_is_there() {
+    let mut talk = Talk::new(Vehicle::flying());
+    // Looking east.
+    talk.is_at(Vec3::new(1.0, 2.0, -0.5), core::f32::consts::FRAC_PI_2);
+    talk.hear(1, "command");
+    assert_eq!(talk.hear(1, "forward 100"), Vec::<String>::new());
+    let goal = talk.vehicle.guided.last().expect("a way-point").position;
+    assert!((goal - Vec3::new(1.0, 3.0, -0.5)).norm() < 1e-5, "{goal}");
+    assert_eq!(talk.wait(50), Vec::<String>::new());
+    talk.is_at(Vec3::new(1.0, 2.95, -0.5), core::f32::consts::FRAC_PI_2);
+    assert_eq!(talk.wait(20), ["ok"]);
+    // Not into the ground, and not to the ceiling.
+    talk.hear(1, "down 400");
+    assert_eq!(talk.vehicle.guided.last().expect("a way-point").position.z, -0.2);
+}
+
+#[test]
+fn a_turn_of_more_than_half_is_flown_in_quarters_the_right_way_round() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+    talk.hear(1, "command");
+    talk.hear(1, "ccw 270");
+    let mut turned = 0.0_f32;
+    let mut answers = Vec::new();
+    for _ in 0..8 {
+        answers.extend(talk.wait(15));
+        let Some(goal) = talk.vehicle.guided.last().map(|command| command.yaw) else { continue };
+        turned += stampfly_types::math::wrap_angle(goal - stampfly_types::math::wrap_angle(turned));
+        talk.is_at(Vec3::new(0.0, 0.0, -0.5), goal);
+    }
+    assert!((turned.to_degrees() + 270.0).abs() < 0.1, "{}", turned.to_degrees());
+    assert_eq!(answers, ["ok"]);
+}
+
+#[test]
+fn anybody_can_stop_the_motors_and_only_the_program_does_anything_else() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.hear(1, "command");
+    assert_eq!(talk.hear(2, "command"), ["error another program commands"]);
+    assert_eq!(talk.hear(2, "land"), ["error say command first"]);
+    assert_eq!(talk.hear(2, "emergency"), ["ok"]);
+    assert_eq!(talk.kinds(), [GuidedKind::Kill]);
+}
+
+#[test]
+fn landing_interrupts_and_the_interrupted_is_answered() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+    talk.hear(1, "command");
+    talk.hear(1, "forward 100");
+    assert_eq!(talk.hear(1, "land"), ["error interrupted"]);
+    talk.vehicle.status(|status| (status.phase, status.armed) = (FlightPhase::IdleGround, false));
+    assert_eq!(talk.wait(20), ["ok"]);
+}
+
+#[test]
+fn sticks_that_stop_coming_are_let_go() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.hear(1, "command");
+    talk.hear(1, "rc 0 0 0 0");
+    talk.wait(5);
+    assert_eq!(talk.vehicle.steered, [], "centred sticks take nothing over");
+    talk.hear(1, "rc 10 -20 30 -40");
+    talk.wait(5);
+    let input = talk.vehicle.steered.last().expect("sticks");
+    let sticks = [input.roll, input.pitch, input.throttle, input.yaw];
+    assert!(
+        sticks.iter().zip([0.1, -0.2, 0.3, -0.4]).all(|(stick, wanted)| (stick - wanted).abs() < 1e-6),
+        "{sticks:?}"
+    );
+    let count = talk.vehicle.steered.len();
+    talk.wait(50);
+    assert!(talk.vehicle.steered.len() - count <= 25, "for half a second");
+    assert_eq!(talk.kinds(), [GuidedKind::Hold]);
+}
+
+#[test]
+fn a_program_that_says_nothing_for_fifteen_seconds_has_gone() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.hear(1, "command");
+    talk.wait(740);
+    let alive = talk.vehicle.alive.len();
+    assert!(alive > 700);
+    talk.wait(200);
+    assert!(talk.vehicle.alive.len() <= alive + 10, "no sign of life any more");
+    assert_eq!(talk.hear(2, "command"), ["ok"], "somebody else's turn");
+}
+
+#[test]
+fn what_is_no_command_says_why() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.hear(1, "command");
+    assert_eq!(talk.hear(1, "forward fifty"), ["error not a number"]);
+    assert_eq!(talk.hear(1, "go 0 0 0 10"), ["error out of range"]);
+    assert_eq!(talk.hear(1, "dance"), ["error unknown command"]);
+    assert_eq!(talk.hear(1, "streamon"), ["error not supported"]);
+    assert_eq!(talk.hear(1, "battery?"), ["0"]);
+}

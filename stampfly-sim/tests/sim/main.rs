@@ -1,0 +1,24 @@
+//! Vehicles, sensors, emulated chips, and the real drivers over them. One binary, because each would link the simulator again:
+//! `cargo test -p stampfly-sim --test sim chips` runs one folder.
+
+mod aeroplane;
+mod agreement;
+mod chips;
+mod compensation;
+mod determinism;
+mod drivers;
+mod hover;
+mod mounting;
+mod outdoors;
+mod physics;
+mod pilot;
+mod scenario;
+mod sensors;
+
+use stampfly_sim::plant::WindConfig;
+use stampfly_sim::{Simulation, SimulationConfig};
+
+/// A vehicle on the floor in still air.
+fn standing() -> Simulation {
+    Simulation::new(&SimulationConfig { wind: WindConfig::CALM, ..SimulationConfig::example() })
+}
