@@ -3,6 +3,7 @@
 //! The station's end of the session, and its socket. What is said on the line is a cable's, and [translated](super::translation).
 
 use super::translation::Translation;
+use crate::waited::wait_at_most;
 use stampfly_link::secure::{Key, MAX_FRAME, Payload, Station};
 use stampfly_services::network::SEALED_UDP;
 use std::fmt;
@@ -68,6 +69,7 @@ impl fmt::Display for RadioPlace {
 /// The line.
 pub struct Sealed {
     socket: UdpSocket,
+    look: Duration,
     station: Station,
     translation: Translation,
     begun: Instant,
@@ -81,10 +83,9 @@ impl Sealed {
         let place = address.to_socket_addrs()?.next().ok_or(io::ErrorKind::NotFound)?;
         let socket = UdpSocket::bind(if place.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
         socket.connect(place)?;
-        socket.set_read_timeout(Some(look))?;
         let [a, b, c, d, ..] = fresh();
         let (station, translation) = (Station::new(key.clone()), Translation::new(u32::from_le_bytes([a, b, c, d])));
-        Ok(Self { socket, station, translation, begun: Instant::now(), signed: None, turned: None })
+        Ok(Self { socket, look, station, translation, begun: Instant::now(), signed: None, turned: None })
     }
 
     /// What has come, after a short wait if nothing has: so many bytes, as a cable has them.
@@ -131,6 +132,7 @@ impl Sealed {
     fn receive(&mut self) -> io::Result<()> {
         // Room for one byte more than a frame has: a datagram that fills it is none.
         let mut room = [0; MAX_FRAME + 1];
+        wait_at_most(&self.socket, self.look)?;
         for _ in 0..AT_ONCE {
             // A vehicle that is not there yet is an error as well, and is waited for as one that is silent.
             let Ok(length) = self.socket.recv(&mut room) else { break };

@@ -5,7 +5,7 @@
 //! nothing for too long is cut off.
 
 use super::limits::Limits;
-use crate::waited::has_only_waited;
+use crate::waited::{has_only_waited, wait_at_most};
 use stampfly_ground::Feed;
 use stampfly_ground::ask::{AskError, Asked, Incoming, Reply};
 use stampfly_ground::{Connection, Hub};
@@ -92,7 +92,9 @@ impl Page {
             }
             // No time at all would be refused.
             let wait = due.saturating_duration_since(Instant::now()).clamp(Duration::from_millis(1), LOOK);
-            self.socket.get_ref().set_read_timeout(Some(wait))?;
+            // On Windows writes do not wait after this either. What the client does not take is
+            // flushed later.
+            wait_at_most(self.socket.get_ref(), wait)?;
             match self.socket.read() {
                 Ok(Message::Text(text)) => self.hear(&text),
                 Ok(Message::Close(_)) => return Ok(()),
