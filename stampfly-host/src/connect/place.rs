@@ -1,6 +1,6 @@
 //! Where a vehicle's line is: a serial port of this computer, or a TCP port that carries one.
 
-use crate::waited::has_only_waited;
+use crate::waited::{has_only_waited, wait_again, wait_at_most};
 use serialport::{SerialPort, SerialPortBuilder};
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -78,9 +78,12 @@ impl Place {
         match self {
             Self::Serial(path) => {
                 // Its two other wires are left as they are: an ESP32-S3 restarts, or starts its boot loader, by them.
-                // A pseudo-terminal is held by whoever made it; no other port has two users.
-                let alone = !path.starts_with("/dev/pts/");
-                Ok(Line::Serial(open(serialport::new(path, baud).timeout(STUCK), alone)?))
+                let is_real = !is_pseudo_terminal(path);
+                // macOS refuses to set the speed of a pseudo-terminal; 0 leaves it as it is.
+                let baud = if is_real || !cfg!(target_os = "macos") { baud } else { 0 };
+                // A pseudo-terminal is held by the program that made it; no other port has two
+                // users.
+                Ok(Line::Serial(open(serialport::new(path, baud).timeout(STUCK), is_real)?))
             }
             Self::Tcp(address) => {
                 let mut last = io::Error::from(ErrorKind::NotFound);
@@ -88,7 +91,6 @@ impl Place {
                     match TcpStream::connect_timeout(&place, CONNECTED) {
                         Ok(stream) => {
                             stream.set_nodelay(true)?;
-                            stream.set_read_timeout(Some(LOOK))?;
                             stream.set_write_timeout(Some(STUCK))?;
                             return Ok(Line::Tcp(stream));
                         }
@@ -99,6 +101,12 @@ impl Place {
             }
         }
     }
+}
+
+/// Does a program of this computer hold the other end? Linux names them `/dev/pts/3`, macOS
+/// `/dev/ttys003`; its real ports are called `/dev/tty.*` and `/dev/cu.*`.
+fn is_pseudo_terminal(path: &str) -> bool {
+    ["/dev/pts/", "/dev/ttys"].iter().any(|begin| path.starts_with(begin))
 }
 
 #[cfg(unix)]
@@ -136,7 +144,12 @@ impl Line {
                 port.set_timeout(LOOK)?;
                 port.read(room)
             }
-            Self::Tcp(stream) => stream.read(room),
+            Self::Tcp(stream) => {
+                wait_at_most(stream, LOOK)?;
+                let read = stream.read(room);
+                wait_again(stream)?;
+                read
+            }
         };
         match read {
             // A connection that was closed, a device that was pulled out.

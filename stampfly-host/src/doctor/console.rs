@@ -2,6 +2,7 @@
 
 use super::visit::Lost;
 use crate::waited::has_only_waited;
+use serialport::{SerialPortInfo, SerialPortType};
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -78,10 +79,17 @@ impl Serial {
     /// The ports that look like a vehicle's: the ESP32-S3's own USB.
     #[must_use]
     pub fn candidates() -> Vec<String> {
-        let named = |name: &String| ["ttyACM", "usbmodem", "COM"].iter().any(|part| name.contains(part));
         let ports = serialport::available_ports().unwrap_or_default();
-        ports.into_iter().map(|port| port.port_name).filter(named).collect()
+        ports.into_iter().filter(looks_like_one).map(|port| port.port_name).collect()
     }
+}
+
+/// Linux has `/dev/ttyACM0`. macOS has two names for it: `/dev/tty.usbmodem1` waits for a carrier,
+/// `/dev/cu.usbmodem1` does not. Windows has `COM5`, and calls the ports of the mainboard alike.
+fn looks_like_one(port: &SerialPortInfo) -> bool {
+    let is_usb = matches!(port.port_type, SerialPortType::UsbPort(_));
+    let name = port.port_name.as_str();
+    name.contains("ttyACM") || name.starts_with("/dev/cu.usbmodem") || (name.starts_with("COM") && is_usb)
 }
 
 impl Port for Serial {
@@ -117,6 +125,7 @@ impl stampfly_sim::vehicle::Port for Serial {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serialport::UsbPortInfo;
 
     #[test]
     fn an_answer_ends_at_the_prompt_and_begins_after_the_echo() {
@@ -124,6 +133,21 @@ mod tests {
         assert_eq!(answer("> > \r\npair\r\n> ", "pair"), Some(""));
         for unfinished in ["sta", "status\r\n", "status\r\nIdle", "status\r\na > b > "] {
             assert_eq!(answer(unfinished, "status"), None, "{unfinished}");
+        }
+    }
+
+    #[test]
+    fn one_vehicle_is_one_port_on_every_system() {
+        let usb = || {
+            let (vid, pid) = (0x303A, 0x1001);
+            SerialPortType::UsbPort(UsbPortInfo { vid, pid, serial_number: None, manufacturer: None, product: None })
+        };
+        let look =
+            |port_name: &str, port_type| looks_like_one(&SerialPortInfo { port_name: port_name.into(), port_type });
+        assert!(look("/dev/ttyACM0", usb()) && look("/dev/cu.usbmodem1101", usb()) && look("COM5", usb()));
+        let unknown = SerialPortType::Unknown;
+        for other in ["/dev/tty.usbmodem1101", "/dev/ttyS0", "/dev/cu.Bluetooth-Incoming-Port", "COM1"] {
+            assert!(!look(other, unknown.clone()), "{other}");
         }
     }
 
