@@ -39,6 +39,7 @@ impl Connections {
     }
 
     /// One that is no TCP connection: what is sent to it waits in this queue.
+    #[cfg(unix)]
     pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
         let (queue, waiting) = sync_channel(WAITING);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(client, Queue { bytes: queue, stays: true });

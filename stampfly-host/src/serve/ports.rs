@@ -118,6 +118,12 @@ impl OpenPorts {
             let mut socket = None;
             // Without a key nobody can say anything there.
             let is_of_use = *spec != PortSpec::SEALED || opened.key.is_some();
+            // Where there are no pseudo-terminals, only one that is asked for by its name is an
+            // error.
+            let is_of_use = is_of_use
+                && (spec.transport != Transport::Terminal
+                    || terminal::EXIST
+                    || options.iter().any(|option| option.name == spec.name));
             if let Some(address) = PortOption::place(options, spec, number).filter(|_| is_of_use) {
                 let failed = |error| OpenError { name: spec.name, address, why: Why::Failed(error) };
                 if spec.signed && !address.ip().is_loopback() && opened.key.is_none() {

@@ -1,19 +1,25 @@
 //! A pseudo-terminal: a serial port that exists in this machine alone, for programs that speak through one.
 //!
-//! Its name is given when it is opened, `/dev/pts/3` or so. There is one line, whoever opens it, and nobody can tell whether somebody does: bytes that nobody reads
-//! are lost. Unix only.
+//! The system gives it a name when it is opened, `/dev/pts/3` or `/dev/ttys003`. There is one line,
+//! whichever program opens it, and the vehicle does not know whether one has: bytes that no program
+//! reads are lost. Windows has no pseudo-terminals; every vehicle offers the same service at a TCP
+//! port.
 
 use super::connections::Connections;
 use super::events::Events;
-use stampfly_sim::vehicle::{Client, Heard};
+use stampfly_sim::vehicle::Client;
 use std::io;
 use std::sync::Arc;
+
+/// Has this system any?
+pub(super) const EXIST: bool = cfg!(unix);
 
 /// Opens one, and returns its name.
 #[cfg(unix)]
 pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Events) -> io::Result<String> {
     use crate::waited::has_only_waited;
     use serialport::{SerialPort as _, TTYPort};
+    use stampfly_sim::vehicle::Heard;
     use std::io::{ErrorKind, Read, Write};
 
     let (mut ours, mut theirs) = TTYPort::pair()?;
