@@ -2,7 +2,6 @@
 //! the reason, where they are not.
 
 use std::env;
-use std::path::Path;
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(recorded_data)");
@@ -10,12 +9,14 @@ fn main() {
     println!("cargo::rerun-if-env-changed=STAMPFLY_DATA");
     // A build script runs in the folder of its package; the data lie beside the workspace.
     let folder = env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../../shared/data".to_owned());
-    match Path::new(&folder).canonicalize() {
-        Ok(folder) => {
+    // The canonical path begins with `\\?\` on Windows; a `/` in what is joined to it is then no
+    // separator.
+    match std::path::absolute(&folder) {
+        Ok(folder) if folder.is_dir() => {
             println!("cargo::rerun-if-changed={}", folder.display());
             println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={}", folder.display());
             println!("cargo::rustc-cfg=recorded_data");
         }
-        Err(_) => println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={folder}"),
+        _ => println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={folder}"),
     }
 }

@@ -132,7 +132,8 @@ fn error_file(job: &Job, shard: Shard) -> PathBuf {
 /// A program of this name in PATH.
 fn in_path(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|program| program.is_file())
+    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    std::env::split_paths(&path).map(|folder| folder.join(&file)).find(|program| program.is_file())
 }
 
 fn has_package(python: impl AsRef<OsStr>) -> bool {

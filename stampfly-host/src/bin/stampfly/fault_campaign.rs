@@ -63,8 +63,9 @@ impl<'o> Campaign<'o> {
         let out = &of_faults.out;
         let io = |error| format!("--out {}: {error}", out.display());
         std::fs::create_dir_all(out).map_err(io)?;
-        // Tasks of an engine may run elsewhere.
-        let out = out.canonicalize().map_err(io)?;
+        // Tasks of an engine may run elsewhere. Not the canonical path: on Windows that begins with
+        // `\\?\`, and few programs take it.
+        let out = std::path::absolute(out).map_err(io)?;
         Ok(Self { plan, cases, out, program: program()?, options })
     }
 
