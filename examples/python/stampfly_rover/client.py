@@ -30,6 +30,10 @@ RENEWAL = 0.5
 #: Seconds after which a silent rover has gone: as long as a subscription lasts.
 PATIENCE = 2.0
 
+#: What a socket reports when an earlier datagram has found no rover: Linux and macOS the first,
+#: Windows the second.
+UNREACHABLE = (ConnectionRefusedError, ConnectionResetError)
+
 #: Seconds to wait for a change of parameters. A rover at a tenth of real time tells of them once a second.
 ANSWER = 5.0
 
@@ -82,7 +86,7 @@ class RoverClient:
         self._sequence = (self._sequence + 1) % (1 << 32)
         try:
             self._socket.send(data)
-        except ConnectionRefusedError:
+        except UNREACHABLE:
             # Reports an earlier datagram: there is no rover at this address yet. The next one may arrive.
             pass
 
@@ -98,7 +102,7 @@ class RoverClient:
                 datagram = Datagram.read(self._socket.recv(2048))
             except (socket.timeout, TimeoutError):
                 return None
-            except ConnectionRefusedError:
+            except UNREACHABLE:
                 time.sleep(min(remaining, 0.01))
                 continue
             except DatagramError:

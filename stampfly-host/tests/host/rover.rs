@@ -12,6 +12,9 @@ use stampfly_rover::com::{Body, MAX};
 use stampfly_rover::messages::{LogRecord, OperatorCommand, Subscription, SystemState};
 use stampfly_types::Instant;
 
+/// What Python's installer calls it.
+const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
+
 /// An empty folder of the test's own.
 fn folder(name: &str) -> PathBuf {
     program::folder("rover", name)
@@ -73,7 +76,7 @@ impl Rover {
 
     /// Runs the Python package with these arguments.
     fn python(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new("python3");
+        let mut command = Command::new(PYTHON);
         command.args(["-m", "stampfly_rover", "--rover", &self.address]).args(arguments);
         command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/python"));
         command
