@@ -22,12 +22,13 @@ pub fn pressure_altitude(pascals: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn altitudes_are_those_of_the_standard_atmosphere() {
         // ICAO doc 7488: 0, 500 and 1000 m.
         for (pascals, metres) in [(101_325.0, 0.0), (95_460.8, 500.0), (89_874.6, 1_000.0)] {
-            assert!((pressure_altitude(pascals) - metres).abs() < 0.5, "{}", pressure_altitude(pascals));
+            assert_abs_diff_eq!(pressure_altitude(pascals), metres, epsilon = 0.5);
         }
     }
 }

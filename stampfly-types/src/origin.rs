@@ -71,6 +71,7 @@ impl Origin {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
     use proptest::prelude::*;
 
     #[test]
@@ -84,7 +85,7 @@ mod tests {
     fn the_date_line_is_no_wall() {
         let origin = Origin { latitude: 0, longitude: 1_799_999_000, altitude: 0 };
         let [_, east] = origin.local(0, -1_799_999_000);
-        assert!((east - 22.26).abs() < 0.01, "{east}");
+        assert_abs_diff_eq!(east, 22.26, epsilon = 0.01);
         assert!(origin.global([0.0, 22.26]).1 < 0);
     }
 

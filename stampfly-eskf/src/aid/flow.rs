@@ -52,6 +52,7 @@ pub fn measured_velocity(flow_rate: [f32; 2], raw_rate: [f32; 2], distance: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn jacobian_matches_numerical_differentiation() {
@@ -73,7 +74,7 @@ mod tests {
         let state = NominalState { gyro_bias: [0.02, 0.05, 0.0].into(), ..NominalState::default() };
         let rows = body_velocity(&state, &state.rotation(), 0.5);
         let measured = measured_velocity([0.0, 0.0], [0.02, 0.05], 0.5);
-        assert!((rows[0].predicted - measured[0]).abs() < 1e-7);
-        assert!((rows[1].predicted - measured[1]).abs() < 1e-7);
+        assert_abs_diff_eq!(rows[0].predicted, measured[0], epsilon = 1e-7);
+        assert_abs_diff_eq!(rows[1].predicted, measured[1], epsilon = 1e-7);
     }
 }

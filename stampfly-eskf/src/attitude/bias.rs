@@ -188,6 +188,7 @@ fn noise(config: &AttitudeConfig, sigma: f32, dt: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     const DT: f32 = 0.0025;
 
@@ -201,7 +202,7 @@ mod tests {
             bias.update_stationary(&config, &truth, DT);
         }
         assert!((bias.value() - truth).amax() < 2e-4, "{:?}", bias.value());
-        assert!((bias.sigma() / config.rest_bias_sigma - 1.0).abs() < 0.1, "{}", bias.sigma());
+        assert_abs_diff_eq!(bias.sigma() / config.rest_bias_sigma, 1.0, epsilon = 0.1);
     }
 
     #[test]

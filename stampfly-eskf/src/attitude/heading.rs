@@ -131,6 +131,7 @@ impl Heading {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     const DT: f32 = 0.01;
     const DEGREE: f32 = math::PI / 180.0;
@@ -172,7 +173,7 @@ mod tests {
             heading.predict(0.0, 0.0, DT);
             heading.update(&config, &pointing(0.0), config.mag_sigma, true, DT);
         }
-        assert!((heading.sigma() / config.mag_start_sigma - 1.0).abs() < 1e-3, "{}", heading.sigma());
+        assert_abs_diff_eq!(heading.sigma() / config.mag_start_sigma, 1.0, epsilon = 1e-3);
     }
 
     #[test]
@@ -194,6 +195,6 @@ mod tests {
         for _ in 0..100 {
             heading.update(&config, &pointing(-170.0), config.mag_sigma, false, DT);
         }
-        assert!((heading.value() / DEGREE - 170.0).abs() < 1.0, "{}", heading.value());
+        assert_abs_diff_eq!(heading.value() / DEGREE, 170.0, epsilon = 1.0);
     }
 }

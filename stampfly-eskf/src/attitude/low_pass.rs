@@ -78,6 +78,7 @@ impl<const N: usize> LowPass<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
     use nalgebra::Vector1;
 
     /// Two passes over the same input: `f32` here, the bilinear biquad in `f64`.
@@ -114,7 +115,7 @@ mod tests {
         for step in 0..4_000u16 {
             filter.step(&Vector1::new(0.3 * f32::from(step) * 0.0025), 0.0025);
         }
-        assert!((filter.rate()[0] - 0.3).abs() < 1e-3, "{:?}", filter.rate());
+        assert_abs_diff_eq!(filter.rate()[0], 0.3, epsilon = 1e-3);
     }
 
     #[test]

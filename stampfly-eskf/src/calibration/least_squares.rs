@@ -70,6 +70,7 @@ impl<const WIDTH: usize> LeastSquares<WIDTH> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     const UNKNOWNS: usize = 9;
     const WIDTH: usize = UNKNOWNS + 1;
@@ -97,9 +98,9 @@ mod tests {
             fit.add(equation(n, if n % 2 == 0 { 0.1 } else { -0.1 }));
         }
         for (found, true_value) in fit.solve().unwrap().iter().take(UNKNOWNS).zip(1u8..) {
-            assert!((found - f32::from(true_value)).abs() < 0.02, "{found} for {true_value}");
+            assert_abs_diff_eq!(found, f32::from(true_value), epsilon = 0.02);
         }
         let rms = fit.residual() / math::sqrt(400.0);
-        assert!((rms - 0.1).abs() < 0.005, "{rms}");
+        assert_abs_diff_eq!(rms, 0.1, epsilon = 0.005);
     }
 }

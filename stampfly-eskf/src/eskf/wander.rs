@@ -75,12 +75,13 @@ pub(super) fn limited(prior: f32, variance: f32, floor: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn a_measurement_leaves_the_floor_and_no_less() {
         let after = |prior: f32, variance: f32| prior * variance / (prior + variance);
-        assert!((after(4.0, limited(4.0, 0.1, 1.0)) - 1.0).abs() < 1e-5);
-        assert!((after(4.0, limited(4.0, 9.0, 1.0)) - after(4.0, 9.0)).abs() < 1e-5, "noise leaves more than that");
+        assert_abs_diff_eq!(after(4.0, limited(4.0, 0.1, 1.0)), 1.0, epsilon = 1e-5);
+        assert_abs_diff_eq!(after(4.0, limited(4.0, 9.0, 1.0)), after(4.0, 9.0), epsilon = 1e-5);
         assert_eq!(limited(0.5, 0.1, 1.0), f32::MAX);
         assert_eq!(limited(0.5, 0.1, 0.0), 0.1);
     }

@@ -258,6 +258,7 @@ mod stored {
 mod tests {
     use super::*;
     use crate::filter::NominalState;
+    use approx::assert_abs_diff_eq;
     use proptest::prelude::*;
 
     /// A rate that grows evenly, 1 rad/s², sampled at this rate: the state, its history and the time after about 0.3 s.
@@ -310,7 +311,7 @@ mod tests {
     fn a_negative_age_extrapolates_the_last_motion() {
         let (state, history, _) = spun_up(400.0);
         let ahead = history.since(-0.01).expect("covered").state_at_start(&state);
-        assert!((ahead.attitude[1] - state.attitude[1] - 0.5 * 0.01 * 0.3).abs() < 1e-4);
-        assert!((ahead.velocity.x - state.velocity.x - 0.003).abs() < 1e-4);
+        assert_abs_diff_eq!(ahead.attitude[1] - state.attitude[1], 0.5 * 0.01 * 0.3, epsilon = 1e-4);
+        assert_abs_diff_eq!(ahead.velocity.x - state.velocity.x, 0.003, epsilon = 1e-4);
     }
 }

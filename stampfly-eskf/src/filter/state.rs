@@ -206,6 +206,7 @@ pub(crate) fn normalize(q: [f32; 4]) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
     use proptest::prelude::*;
 
     /// Of turns, rad.
@@ -253,7 +254,7 @@ mod tests {
         let motion = after.propagate(&Vec3::new(1.0, -2.0, -9.0), &Vec3::new(0.5, 1.0, -3.0), 0.0025);
         let turned = multiply(before.attitude, motion.delta_rotation);
         for (a, b) in turned.iter().zip(after.attitude) {
-            assert!((a - b).abs() < 1e-6);
+            assert_abs_diff_eq!(a, b, epsilon = 1e-6);
         }
         let gained = after.velocity - before.velocity - Vec3::new(0.0, 0.0, GRAVITY * motion.dt);
         assert!((gained - motion.delta_velocity).amax() < 1e-6);
@@ -265,8 +266,8 @@ mod tests {
         for _ in 0..400 {
             state.propagate(&Vec3::zeros(), &Vec3::zeros(), 0.0025);
         }
-        assert!((state.velocity.z - GRAVITY).abs() < 1e-3);
-        assert!((state.position.z - 0.5 * GRAVITY).abs() < 1e-3);
+        assert_abs_diff_eq!(state.velocity.z, GRAVITY, epsilon = 1e-3);
+        assert_abs_diff_eq!(state.position.z, 0.5 * GRAVITY, epsilon = 1e-3);
         let mut state = NominalState::default();
         for _ in 0..400 {
             state.propagate(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::zeros(), 0.0025);
