@@ -98,7 +98,7 @@ mod tests {
             fit.add(equation(n, if n % 2 == 0 { 0.1 } else { -0.1 }));
         }
         for (found, true_value) in fit.solve().unwrap().iter().take(UNKNOWNS).zip(1u8..) {
-            assert_abs_diff_eq!(found, f32::from(true_value), epsilon = 0.02);
+            assert_abs_diff_eq!(*found, f32::from(true_value), epsilon = 0.02);
         }
         let rms = fit.residual() / math::sqrt(400.0);
         assert_abs_diff_eq!(rms, 0.1, epsilon = 0.005);

@@ -254,7 +254,7 @@ mod tests {
         let motion = after.propagate(&Vec3::new(1.0, -2.0, -9.0), &Vec3::new(0.5, 1.0, -3.0), 0.0025);
         let turned = multiply(before.attitude, motion.delta_rotation);
         for (a, b) in turned.iter().zip(after.attitude) {
-            assert_abs_diff_eq!(a, b, epsilon = 1e-6);
+            assert_abs_diff_eq!(*a, b, epsilon = 1e-6);
         }
         let gained = after.velocity - before.velocity - Vec3::new(0.0, 0.0, GRAVITY * motion.dt);
         assert!((gained - motion.delta_velocity).amax() < 1e-6);
