@@ -40,9 +40,5 @@ mod safety_mode;
 mod safety_sensors;
 mod stm32_quad;
 mod swap;
+mod thorough;
 mod tunes;
-
-/// How many flights of each kind somebody wants who has more time: the variable `FLIGHTS`.
-fn flights() -> Option<u64> {
-    std::env::var("FLIGHTS").ok().map(|text| text.parse().expect("FLIGHTS is a number"))
-}
