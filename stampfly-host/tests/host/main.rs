@@ -17,6 +17,7 @@ mod faults;
 mod figures;
 mod flight_task;
 mod flips;
+mod flown;
 mod flying_quality;
 mod ground;
 mod held;
