@@ -1,6 +1,8 @@
 //! `stampfly connect`: a simulated vehicle at the other end of a line, a page's socket at this one.
 
-use crate::program::{Program, folder};
+#[cfg(unix)]
+use crate::program::signal;
+use crate::program::{Program, folder, interrupt};
 use serde_json::{Value, json};
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -182,13 +184,16 @@ pub fn recorded(folder: &Path, place: &str, more: &[&str]) {
     let whats = [
         (json!({ "do": "guided", "kind": "arm" }), 1),
         (json!({ "do": "guided", "kind": "take_off", "height": 0.3 }), 3),
-        (json!({ "do": "guided", "kind": "land" }), 3),
+        (json!({ "do": "guided", "kind": "land" }), 0),
     ];
     for (id, (what, seconds)) in (3..).zip(whats) {
         let answer = ask(&mut socket, id, what.clone());
         assert_eq!(answer["ok"], json!(true), "{what}: {answer}");
         passes(&mut socket, seconds);
     }
+    // It has landed, and its motors are off.
+    is_done(&mut socket, 6, "status", "blocks   NO_LINK\n");
+    interrupt(&connected.0);
     let said = connected.said("flight.sfr: ", "flight.sfr: ");
     assert!(said.parse().is_ok_and(|chunks: u32| chunks > 1_000), "{said} chunks");
     let replay = Command::new(env!("CARGO_BIN_EXE_stampfly"))
@@ -223,13 +228,6 @@ fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_
     assert_eq!(code(&["/dev/null", "--port", "tello=1"]), Some(1), "as of serve");
 }
 
-/// Sends a signal to a program.
-#[cfg(unix)]
-fn signal(Program(process): &Program, name: &str) {
-    let sent = Command::new("kill").args([name, &process.id().to_string()]).status();
-    assert!(sent.expect("kill").success());
-}
-
 #[test]
 #[cfg(unix)]
 fn a_computer_that_sleeps_for_a_moment_loses_neither_the_line_nor_the_page() {
@@ -239,8 +237,8 @@ fn a_computer_that_sleeps_for_a_moment_loses_neither_the_line_nor_the_page() {
     next(&mut socket, "event", is_up(true));
     for _ in 0..3 {
         for name in ["-STOP", "-CONT"] {
-            signal(&serving, name);
-            signal(&connected, name);
+            signal(&serving.0, name);
+            signal(&connected.0, name);
             std::thread::sleep(Duration::from_millis(200));
         }
     }

@@ -1,7 +1,7 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
 use crate::connect::{alive, ask, connect, is_done, is_up, next, page, passes, rate, recorded, sample};
-use crate::program::{Program, folder};
+use crate::program::{Program, folder, interrupt};
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::ops::Range;
@@ -105,6 +105,7 @@ fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
     let (mut stranger, mut page) = connect(&folder, &format!("udp:{place}"), &["--key", &others, "--for", "10"]);
     next(&mut page, "event", is_up(false));
     assert_eq!(ask(&mut page, 1, json!({ "do": "guided", "kind": "kill" }))["ok"], json!(false));
+    interrupt(&stranger.0);
     assert_eq!(stranger.0.wait().expect("it ends").code(), Some(1));
 
     drop(serving);

@@ -1,7 +1,9 @@
 //! The default controller beside the incremental one, on vehicles that are not as the airframe says.
 //!
-//! `cargo test --release -p stampfly-host --test host controllers -- --nocapture` prints the figures of `docs/controllers.md`.
+//! The figures of `docs/controllers.md`:
+//! `STAMPFLY_THOROUGH=1 cargo test --release -p stampfly-host --test host controllers -- --nocapture`.
 
+use crate::thorough::thorough;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::faults::FAULTS;
 use stampfly_board::simulation::{Setup, StampFly};
@@ -103,7 +105,7 @@ impl Witness<Runnables> for Seen {
 /// Medians over the flights of one case: position error, m, root mean square of the rate, deg/s, and of the torque's change,
 /// µN·m; the largest lean of all flights, deg.
 fn fly(case: &Case, controller: f32) -> [f64; 4] {
-    let setups: Vec<(u64, Setup)> = (1..=6)
+    let setups: Vec<(u64, Setup)> = (1..=thorough(2, 6))
         .map(|seed| {
             let mut setup = Setup::reference(seed);
             (case.change)(&mut setup);

@@ -2,18 +2,17 @@
 //!
 //! The hash covers every sample of every topic with its instant and number, so one different bit anywhere shows.
 
-use stampfly_board::simulation::mission::Mission;
+use crate::flown::{HOP, Hop, hop};
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
 use stampfly_types::Instant;
+use std::sync::LazyLock;
 
 const SEEDS: [u64; 8] = [1, 2, 3, 5, 8, 13, 21, 34];
 
-/// A short flight: up, a step aside with a turn, down.
 fn setup(seed: u64) -> Setup {
-    let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
-    Setup { mission, ..Setup::reference(seed) }
+    hop(seed, None)
 }
 
 fn hash_with(setup: &Setup, mut recorder: Recorder<StampFly>) -> u64 {
@@ -31,6 +30,7 @@ fn watching_changes_nothing() {
     let setup = setup(1);
     let expected = hash(&setup);
     assert_eq!(hash(&setup), expected, "flown again");
+    assert_eq!(HOP.hash, expected, "with a log and a compact record");
     assert_eq!(hash_with(&setup, Recorder::<StampFly>::with_log(&setup, &[])), expected, "with a log");
     assert_eq!(hash_with(&setup, Recorder::<StampFly>::hash_only().with_timing()), expected, "with timing");
     let facts = [("who".to_owned(), "somebody".to_owned())];
@@ -43,15 +43,9 @@ fn watching_changes_nothing() {
 
 #[test]
 fn the_log_and_the_figures_are_the_same_too() {
-    let once = || {
-        let setup = setup(3);
-        let mut recorder = Recorder::<StampFly>::with_log(&setup, &[]);
-        let flown = fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
-        (recorder.log().to_vec(), flown.outcome.metrics, flown.outcome.phases, flown.duration)
-    };
-    let (first, second) = (once(), once());
-    assert!(first.0.len() > 1_000_000, "a whole flight");
-    assert!(first == second);
+    let (first, second) = (&*HOP, Hop::fly(&setup(1)));
+    assert!(first.log.len() > 1_000_000, "a whole flight");
+    assert!(*first == second);
 }
 
 #[test]
@@ -63,7 +57,7 @@ fn whatever_decides_a_flight_changes_its_hash() {
         hash(&setup)
     };
     let mut hashes = vec![
-        ("nothing", hash(&reference)),
+        ("nothing", HOP.hash),
         ("seed", changed(|setup| setup.simulation.seed = 2)),
         ("start", changed(|setup| setup.simulation.start = Instant::from_micros(1))),
         ("mass", changed(|setup| setup.simulation.plant.mass *= 1.000_001)),
@@ -85,14 +79,16 @@ fn a_late_executor_is_late_in_the_same_way_again() {
     assert_eq!(hash(&setup), hash(&setup));
 }
 
+/// The hash of each, each by itself.
+static ALONE: LazyLock<Vec<u64>> = LazyLock::new(|| SEEDS.iter().map(|seed| hash(&setup(*seed))).collect());
+
 #[test]
 fn vehicles_on_other_threads_do_not_matter() {
-    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&setup(*seed))).collect();
     let together: Vec<u64> = std::thread::scope(|scope| {
         let threads: Vec<_> = SEEDS.iter().map(|seed| scope.spawn(|| hash(&setup(*seed)))).collect();
         threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
     });
-    assert_eq!(alone, together);
+    assert_eq!(*ALONE, together);
 }
 
 /// Flies the first vehicle; in the middle of its flight flies the next one, and so on.
@@ -114,6 +110,5 @@ fn nested(seeds: &[u64]) -> Vec<u64> {
 /// Eight vehicles in the air at once on one thread: there is nothing they could share.
 #[test]
 fn vehicles_on_the_same_thread_do_not_matter() {
-    let alone: Vec<u64> = SEEDS.iter().map(|seed| hash(&setup(*seed))).collect();
-    assert_eq!(nested(&SEEDS), alone);
+    assert_eq!(nested(&SEEDS), *ALONE);
 }

@@ -1,5 +1,6 @@
 //! The doctor names what is wrong with an emulated vehicle, and finds nothing on a sound one.
 
+use crate::thorough::thorough;
 use stampfly_board::simulation::bench::{Fault, fault, with_vehicle};
 use stampfly_board::topics::Id;
 use stampfly_host::doctor::{Chart, emulated};
@@ -36,6 +37,8 @@ fn each<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> 
 fn every_fault_is_named_and_nothing_else() {
     let faults = fault::all();
     assert!(faults.len() >= 25, "{}", faults.len());
+    // Every fourth is of another kind, and of most chips.
+    let faults: Vec<Fault> = faults.into_iter().step_by(thorough(4, 1)).collect();
     let charts = each(&faults, |Fault { defect, .. }| emulated::examine(Some(defect), 1));
     let wrong: Vec<String> = faults
         .iter()
@@ -52,7 +55,7 @@ fn every_fault_is_named_and_nothing_else() {
 
 #[test]
 fn nothing_is_found_on_a_sound_vehicle() {
-    let seeds: Vec<u64> = (1..=6).collect();
+    let seeds: Vec<u64> = (1..=thorough(3, 6)).collect();
     let charts = each(&seeds, |seed| emulated::examine(None, *seed));
     for (seed, chart) in seeds.iter().zip(&charts) {
         assert_eq!(names(chart), [""; 0], "seed {seed}:\n{chart}");

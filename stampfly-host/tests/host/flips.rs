@@ -1,8 +1,10 @@
 //! Turning over, in every direction and on many seeds: once round, back to its height and its place, without an alert, and down
 //! again as after any flight.
 //!
-//! `cargo test --release -p stampfly-host --test host flips -- --nocapture` prints the figures.
+//! The figures of `docs/controllers.md`:
+//! `STAMPFLY_THOROUGH=1 cargo test --release -p stampfly-host --test host flips -- --nocapture`.
 
+use crate::thorough::thorough;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
@@ -109,14 +111,14 @@ fn setup(seed: u64, mission: &str, controller: f32) -> Setup {
 }
 
 #[test]
-fn in_every_direction_on_twenty_seeds() {
+fn in_every_direction() {
     println!(
         "| way | lasts, s | above, m | below, m | beside, m | 3 s later from its place, m | position error, m | tilt error, deg |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     for way in WAYS {
         let mission = format!("arm; takeoff {HEIGHT}; hover 2; flip {way}; hover 5; land");
-        let setups: Vec<_> = (1..=20).map(|seed| (seed, setup(seed, &mission, 0.0))).collect();
+        let setups: Vec<_> = (1..=thorough(4, 20)).map(|seed| (seed, setup(seed, &mission, 0.0))).collect();
         let flights = campaign::run::<StampFly, Seen>(&setups, &|_, _| Seen::default(), &|_| {});
         let mut worst = [0.0f32; 7];
         for flight in &flights {
@@ -157,7 +159,7 @@ fn too_low_it_stays_as_it_is() {
 fn with_every_controller() {
     for controller in [1.0, 2.0] {
         let mission = "arm; takeoff 1.5; hover 2; flip right; hover 5; flip back; hover 4; land";
-        let setups: Vec<_> = (1..=4).map(|seed| (seed, setup(seed, mission, controller))).collect();
+        let setups: Vec<_> = (1..=thorough(2, 4)).map(|seed| (seed, setup(seed, mission, controller))).collect();
         for flight in campaign::run::<StampFly, Seen>(&setups, &|_, _| Seen::default(), &|_| {}) {
             let seen = &flight.witness;
             assert!(flight.succeeded() && seen.ended.is_some(), "controller {controller}, seed {}", flight.seed);

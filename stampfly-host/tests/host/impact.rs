@@ -65,7 +65,7 @@ impl Witness<Runnables> for Timing {
 
 #[test]
 fn a_wall_stops_the_motors() {
-    let flights = crate::flights().unwrap_or(40);
+    let flights = crate::thorough::flights(16, 40);
     let mut all = Vec::new();
     for seed in 1..=flights {
         let mission = Mission::parse("arm\ntakeoff 0.6\ngoto 2 0 0.6 speed 1.5\nland\n").expect("a mission");

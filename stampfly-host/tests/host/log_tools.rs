@@ -1,23 +1,20 @@
 //! Logs of flights in the tools' hands: a part replays, tables and MCAP hold what the log holds.
 
-use crate::replay::{record, replay, setup};
+use crate::flown::{HOP, Hop, hop};
+use crate::replay::replay;
 use serde_json::Value;
 use stampfly_host::log::{csv, cut, info::Info, mcap};
 use stampfly_lab::flight_log;
 use stampfly_types::Instant;
 use std::io::Cursor;
 
-fn log() -> Vec<u8> {
-    record(&setup(3, None))
-}
-
 #[test]
 fn a_part_of_a_flight_replays_bit_for_bit() {
-    let whole = log();
+    let whole = &Hop::fly(&hop(3, None)).log;
     let length = Info::of(&flight_log::parse(&whole).expect("a log")).last_s;
     for (from, to) in [(0.0, 4.0), (4.0, 9.5), (length - 3.0, length + 10.0)] {
         let instant = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
-        let part = cut::cut(&whole, instant(from), instant(to)).expect("a log");
+        let part = cut::cut(whole, instant(from), instant(to)).expect("a log");
         assert!(part.len() < whole.len() * 2 / 3, "{from} to {to}");
         let again = replay(&part).expect("a log of ours");
         assert_eq!(again.difference, None, "{from} to {to}");
@@ -27,12 +24,16 @@ fn a_part_of_a_flight_replays_bit_for_bit() {
         assert!(info.first_s >= from && info.last_s <= to, "{info}");
         assert_eq!(info.gaps, usize::from(from > 0.0));
     }
-    assert_eq!(cut::cut(&whole, Instant::ZERO, Instant::from_secs(1_000)), Ok(whole), "everything is the log itself");
+    assert_eq!(
+        cut::cut(whole, Instant::ZERO, Instant::from_secs(1_000)).as_ref(),
+        Ok(whole),
+        "everything is the log itself"
+    );
 }
 
 #[test]
 fn a_damaged_log_is_not_cut() {
-    let mut damaged = log();
+    let mut damaged = HOP.log.clone();
     let middle = damaged.len() / 2;
     damaged.drain(middle..middle + 3);
     assert!(cut::cut(&damaged, Instant::ZERO, Instant::from_secs(1_000)).is_err());
@@ -41,7 +42,7 @@ fn a_damaged_log_is_not_cut() {
 
 #[test]
 fn tables_and_mcap_hold_what_the_log_holds() {
-    let log = flight_log::parse(&log()).expect("a log");
+    let log = flight_log::parse(&HOP.log).expect("a log");
     let series = &log.flight.topics["sensor_imu"];
     let mut table = Vec::new();
     csv::write(series, &mut table).expect("memory");
@@ -65,7 +66,7 @@ fn tables_and_mcap_hold_what_the_log_holds() {
 }
 
 mod again {
-    use super::Instant;
+    use super::{HOP, Instant};
     use stampfly_board::simulation::StampFly;
     use stampfly_host::flown::fly;
     use stampfly_host::log::refly::{Reflown, ReflyError, facts, refly};
@@ -75,6 +76,7 @@ mod again {
     use stampfly_sim::vehicle::change::ChangeError;
     use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
     use stampfly_types::Duration;
+    use std::sync::LazyLock;
 
     const FROM: Instant = Instant::from_millis(9_000);
 
@@ -91,6 +93,9 @@ mod again {
         let mission = Some("arm; takeoff 0.5; hover 2; goto 1 0 0.7; land".into());
         Options { mission, param: vec!["eskf.gate=4.5".into()], gust: Some(0.2), ..Options::default() }
     }
+
+    /// The flight that is flown again, with other parameters.
+    static LOG: LazyLock<Vec<u8>> = LazyLock::new(|| log_of(&options()));
 
     fn again(log: &[u8], parameter: &str) -> Result<Reflown<<StampFly as Vehicle>::Outcome>, ReflyError> {
         refly::<StampFly>(log, FROM, &[parameter.to_owned()])
@@ -113,14 +118,14 @@ mod again {
 
     #[test]
     fn another_value_changes_what_comes_after_and_nothing_before() {
-        let log = log_of(&options());
-        let reflown = again(&log, "position.pos.kp=0.4").expect("flies");
+        let log = &*LOG;
+        let reflown = again(log, "position.pos.kp=0.4").expect("flies");
         assert!(
             reflown.changed_at >= FROM && reflown.changed_at < Instant::from_millis(9_010),
             "{}",
             reflown.changed_at
         );
-        let [before, now] = [&log, &reflown.log].map(|log| flight_log::parse(log).expect("a log").flight);
+        let [before, now] = [log, &reflown.log].map(|log| flight_log::parse(log).expect("a log").flight);
         let mut differing = 0;
         for (topic, old) in &before.topics {
             let new = &now.topics[topic];
@@ -150,20 +155,20 @@ mod again {
 
     #[test]
     fn what_cannot_be_flown_again_is_refused_with_the_reason() {
-        let log = log_of(&options());
-        let refused = |parameter: &str| again(&log, parameter).err().map(|error| error.to_string()).unwrap_or_default();
+        let log = &*LOG;
+        let refused = |parameter: &str| again(log, parameter).err().map(|error| error.to_string()).unwrap_or_default();
         assert!(refused("position.tilt.max=0.7").contains("failsafe.tip.tilt"), "a combination that cannot fly");
         assert!(refused("position.tilt.max=7").contains("must be from"));
         for parameter in ["estimator.type=1", "controller.type=1"] {
-            let Err(error) = again(&log, parameter) else { panic!("{parameter} is another component") };
+            let Err(error) = again(log, parameter) else { panic!("{parameter} is another component") };
             assert!(matches!(error, ReflyError::Change(ChangeError::OtherComponents)), "{parameter}: {error}");
         }
         let from_start =
-            refly::<StampFly>(&log, Instant::ZERO, &["estimator.type=1".into()]).expect("any component may begin");
-        assert!(from_start.log != log && crate::replay::replay(&from_start.log).expect("a log").difference.is_none());
-        let error = refly::<StampFly>(&log, Instant::from_secs(1_000), &["eskf.gate=4".into()]).expect_err("over");
+            refly::<StampFly>(log, Instant::ZERO, &["estimator.type=1".into()]).expect("any component may begin");
+        assert!(from_start.log != *log && crate::replay::replay(&from_start.log).expect("a log").difference.is_none());
+        let error = refly::<StampFly>(log, Instant::from_secs(1_000), &["eskf.gate=4".into()]).expect_err("over");
         assert!(matches!(error, ReflyError::Over), "{error}");
-        let error = again(&super::log(), "eskf.gate=4").expect_err("as a board's own log, it names no world");
+        let error = again(&HOP.log, "eskf.gate=4").expect_err("as a board's own log, it names no world");
         assert!(matches!(error, ReflyError::NoWorld) && error.to_string().contains("stampfly replay"), "{error}");
         let mut other = log.clone();
         let place = other.windows(5).position(|bytes| bytes == b"seed3").expect("a fact") + 4;

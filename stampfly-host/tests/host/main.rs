@@ -17,6 +17,7 @@ mod faults;
 mod figures;
 mod flight_task;
 mod flips;
+mod flown;
 mod flying_quality;
 mod ground;
 mod held;
@@ -40,9 +41,5 @@ mod safety_mode;
 mod safety_sensors;
 mod stm32_quad;
 mod swap;
+mod thorough;
 mod tunes;
-
-/// How many flights of each kind somebody wants who has more time: the variable `FLIGHTS`.
-fn flights() -> Option<u64> {
-    std::env::var("FLIGHTS").ok().map(|text| text.parse().expect("FLIGHTS is a number"))
-}

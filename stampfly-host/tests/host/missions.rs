@@ -1,9 +1,10 @@
-//! Three hundred missions nobody has thought of: random routes, wind, vehicles, clocks and executors, all of which
-//! have to end with a vehicle that stands where it was sent and is disarmed.
+//! Three hundred random missions: routes, wind, vehicles, clocks and executors. The small size flies
+//! a fifth of them. All have to end with a vehicle that stands where it was sent and is disarmed.
 //!
 //! Every mission follows from its number. To fly one alone, with its log written to the target folder's `tmp`:
 //! `MISSION=17 cargo test -p stampfly-host --test host missions -- --nocapture`.
 
+use crate::thorough::thorough;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_board::simulation::mission::{Mission, Step};
@@ -145,10 +146,13 @@ fn investigate(number: u64) {
 #[test]
 fn every_random_mission_ends_on_the_ground_and_disarmed() {
     let alone: Option<u64> = std::env::var("MISSION").ok().map(|text| text.parse().expect("MISSION is a number"));
-    let numbers = alone.map_or(1..=300, |number| number..=number);
+    // A fifth of them has every kind of clock and executor. Mission 78 found flow that was doubted
+    // without a reason.
+    let few = || (1..=60).chain([78]).collect();
+    let numbers: Vec<u64> = alone.map_or_else(|| thorough(few(), (1..=300).collect()), |number| vec![number]);
     alone.into_iter().for_each(investigate);
 
-    let setups: Vec<(u64, Setup)> = numbers.map(|number| (number, random_mission(number))).collect();
+    let setups: Vec<(u64, Setup)> = numbers.into_iter().map(|number| (number, random_mission(number))).collect();
     let flights = run::<StampFly, ()>(&setups, &|_, _| (), &|_| {});
     assert_eq!(flights.len(), setups.len());
     let failed: Vec<String> = flights

@@ -36,6 +36,22 @@ pub fn campaign_of_faults(folder: &Path, vehicle: &str, flights: u64) {
     assert!(line.contains(&format!("--vehicle {vehicle}")), "{line}");
 }
 
+/// Sends a signal to a program.
+#[cfg(unix)]
+pub fn signal(program: &Child, name: &str) {
+    let sent = Command::new("kill").args([name, &program.id().to_string()]).status();
+    assert!(sent.expect("kill").success());
+}
+
+/// Ctrl-C, so that a test need not wait until the program's time is over. Without such signals, as on
+/// Windows, it waits.
+pub fn interrupt(program: &Child) {
+    #[cfg(unix)]
+    signal(program, "-INT");
+    #[cfg(not(unix))]
+    let _ = program;
+}
+
 /// It runs.
 pub struct Program(pub Child);
 

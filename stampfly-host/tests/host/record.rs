@@ -1,6 +1,7 @@
 //! Compact records of simulated flights: streamed, received, run again, replayed bit for bit, turned into logs.
 
-use crate::replay::setup;
+use crate::flown::{HOP, Hop, LATE, hop};
+use crate::thorough::thorough;
 use stampfly_board::VehicleConfig;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::StampFly;
@@ -9,7 +10,6 @@ use stampfly_flight::replay::{Replay, ReplayOptions, replay};
 use stampfly_host::flown::fly;
 use stampfly_host::log::info::Info;
 use stampfly_host::log::record::{RecordError, as_log, run_again};
-use stampfly_host::recorder::Recorder;
 use stampfly_host::serve::{RecordOut, receive};
 use stampfly_lab::flight_log;
 use stampfly_log::ulog::{Message, Reader};
@@ -17,17 +17,7 @@ use stampfly_rover::simulation::Rover;
 use stampfly_sim::vehicle::{Options, Vehicle};
 use stampfly_types::Instant;
 use std::net::UdpSocket;
-use std::sync::LazyLock;
 use std::time::Duration;
-
-fn record(seed: u64, jitter: Option<u64>) -> (Vec<u8>, Vec<u8>) {
-    let mut witness = (RecordOut::memory("stampfly"), Recorder::<StampFly>::with_log(&setup(seed, jitter), &[]));
-    fly::<StampFly>(&setup(seed, jitter), &mut witness, &mut |_, _| {});
-    (witness.0.file().to_vec(), witness.1.log().to_vec())
-}
-
-/// The same flight as a compact record and as a log.
-static FLIGHT: LazyLock<(Vec<u8>, Vec<u8>)> = LazyLock::new(|| record(1, Some(1)));
 
 fn again(log: &[u8]) -> Replay {
     let options = ReplayOptions { from: Some(Instant::ZERO), is_thinned: true };
@@ -49,19 +39,21 @@ fn samples(log: &[u8], name: &str) -> Vec<Vec<u8>> {
 
 #[test]
 fn flights_with_an_executor_that_is_late_replay_bit_for_bit() {
-    for (seed, jitter) in [(1, None), (3, Some(1)), (4, Some(2))] {
-        let (file, _) = record(seed, jitter);
-        let (log, contents) = run_again(&file, None, Samples::Recorded).expect("reads");
-        assert_eq!((contents.gaps, contents.lost, contents.idle_since), (0, 0, None), "{jitter:?}");
+    let others = [(4, Some(2)), (3, Some(1))];
+    let others = &others[..thorough(1, others.len())];
+    let others: Vec<Hop> = others.iter().map(|(seed, jitter)| Hop::fly(&hop(*seed, *jitter))).collect();
+    for flown in [&*HOP].into_iter().chain(&others) {
+        let (log, contents) = run_again(&flown.record, None, Samples::Recorded).expect("reads");
+        assert_eq!((contents.gaps, contents.lost, contents.idle_since), (0, 0, None));
         let replayed = again(&log);
-        assert_eq!(replayed.difference, None, "{jitter:?}");
+        assert_eq!(replayed.difference, None);
         assert!(replayed.activations > 20_000 && replayed.samples > 100 && contents.key_frames > 1, "{replayed:?}");
     }
 }
 
 #[test]
 fn a_record_run_again_is_the_log_of_the_same_flight() {
-    let (file, log) = &*FLIGHT;
+    let Hop { record: file, log, .. } = &*LATE;
     let (again, contents) = as_log(file).expect("reads");
     assert!(contents.is_some() && file.len() * 5 < log.len(), "{} of {}", file.len(), log.len());
     for topic in ["estimate_state", "actuator_motor", "sensor_imu", "telemetry"] {
@@ -75,7 +67,7 @@ fn a_record_run_again_is_the_log_of_the_same_flight() {
 
 #[test]
 fn damaged_and_empty_files_are_errors_or_gaps() {
-    let (file, _) = &*FLIGHT;
+    let file = &LATE.record;
     for length in [0, 1, 8, 9, 40, 1000] {
         let part = &file[..length];
         assert!(run_again(part, None, Samples::Recorded).is_err() || length == 0, "{length}");
@@ -103,12 +95,12 @@ fn datagrams_arrive_as_the_same_file() {
         (file, receiver)
     });
     let mut witness = RecordOut::datagrams("stampfly", to).expect("a socket");
-    fly::<StampFly>(&setup(1, Some(1)), &mut witness, &mut |_, _| {});
+    fly::<StampFly>(&hop(1, Some(1)), &mut witness, &mut |_, _| {});
     let (file, receiver) = receiving.join().expect("received");
     assert!(receiver.chunks() > 50 && receiver.chunks() + receiver.missing() > 300, "{receiver:?}");
     let (log, contents) = run_again(&file, None, Samples::Recorded).expect("reads");
     // Loopback loses some when this machine is busy, and that is then a gap.
-    assert!(receiver.missing() > 0 || file == FLIGHT.0, "the same flight, the same file");
+    assert!(receiver.missing() > 0 || file == LATE.record, "the same flight, the same file");
     assert!(contents.gaps <= receiver.missing() && again(&log).difference.is_none());
 }
 

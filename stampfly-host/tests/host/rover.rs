@@ -88,8 +88,9 @@ impl Rover {
         if output.status.code() == Some(code) { Ok(()) } else { Err(format!("{arguments:?}: {output:?}")) }
     }
 
-    /// Waits for its end, and repeats the session from its log.
+    /// Ends it, and repeats the session from its log.
     fn end(mut self) {
+        program::interrupt(&self.process);
         assert!(self.process.wait().expect("it ends").success(), "the vehicle did what it must not");
         stampfly(&self.folder, &["replay", "flight.ulg"]);
     }

@@ -2,10 +2,13 @@
 //! sources that speak for each other. Every test is named after the defect that it keeps out.
 
 use crate::losses::harness::{STICKS, Seen, climb, instant, run, send};
+use crate::thorough::thorough;
 use stampfly_types::messages::{ArmBlocks, CommandSource, FlightMode, FlightPhase, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
+fn seeds() -> std::ops::RangeInclusive<u64> {
+    1..=thorough(1, 3)
+}
 
 /// Speed with which the vehicle first touches the ground after this instant, m/s; it has to end there, disarmed.
 fn touches(what: &str, seen: &Seen, since: Instant) -> f32 {
@@ -30,7 +33,7 @@ fn at(seen: &Seen, instant: Instant) -> (FlightPhase, FlightMode, CommandSource)
 #[test]
 fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
     for mode in [FlightMode::Stabilize, FlightMode::Acro] {
-        for seed in SEEDS {
+        for seed in seeds() {
             let (since, note) = instant();
             let seen = run(seed, 40.0, |mut hands| {
                 Box::pin(async move {
@@ -57,7 +60,7 @@ fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
 #[test]
 fn d2_a_height_that_is_lost_is_no_reason_to_stop_the_motors() {
     for mode in [FlightMode::AltHold, FlightMode::PosHold] {
-        for seed in SEEDS {
+        for seed in seeds() {
             let (since, note) = instant();
             let seen = run(seed, 25.0, |mut hands| {
                 Box::pin(async move {
@@ -114,7 +117,7 @@ fn d5_a_transmitter_switched_on_while_a_program_flies_changes_nothing() {
 
 #[test]
 fn d6_a_transmitter_that_restarts_while_landing_does_not_stop_the_motors() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 45.0, |mut hands| {
             Box::pin(async move {

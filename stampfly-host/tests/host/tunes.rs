@@ -2,6 +2,7 @@
 //!
 //! `cargo test --release -p stampfly-host --test host tunes -- --nocapture` prints the figures of `docs/controllers.md`.
 
+use crate::thorough::thorough;
 use stampfly_board::airframe::INERTIA;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::mission::Mission;
@@ -60,7 +61,8 @@ fn every_axis_of_a_vehicle_that_is_not_as_it_is_said_to_be() {
     );
     println!("|---|---|---|---|---|---|---|---|");
     for (name, factor, change) in CASES {
-        let flights = tuned(&[setup(1, MISSION, change), setup(2, MISSION, change)]);
+        let seeds = 1..=thorough(1, 2);
+        let flights = tuned(&seeds.map(|seed| setup(seed, MISSION, change)).collect::<Vec<_>>());
         let config = stampfly_board::VehicleConfig::default().cascade.rate;
         for (of_flight, statuses) in flights.iter().enumerate() {
             assert_eq!(statuses.len(), 3, "{name}: {statuses:?}");

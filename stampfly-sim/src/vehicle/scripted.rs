@@ -26,6 +26,11 @@ pub trait Script: Clone {
     /// The flight is over after this many lines.
     fn length(&self) -> usize;
 
+    /// Is it ended from outside before that? A script of its own is not.
+    fn is_ended(&self) -> bool {
+        false
+    }
+
     /// How a flight with this log went.
     fn judge(&self, lines: Vec<Self::Line>) -> Self::Outcome;
 }
@@ -85,7 +90,7 @@ impl<S: Script> Around for Following<'_, S> {
     }
 
     fn is_over(&mut self, _: Instant) -> bool {
-        self.lines.len() >= self.script.length()
+        self.lines.len() >= self.script.length() || self.script.is_ended()
     }
 
     fn finish(self) -> S::Outcome {

@@ -13,10 +13,9 @@ use stampfly_host::campaign::shard::Shard;
 use stampfly_host::campaign::shrink::shrink;
 use stampfly_host::campaign::summary::Summary;
 use stampfly_host::campaign::{file, page, parallel};
-use stampfly_log::FlightHash;
 use stampfly_sim::vehicle::Vehicle;
-use stampfly_types::Instant;
 use std::fmt::Write;
+use std::hash::{DefaultHasher, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as WallInstant;
@@ -337,14 +336,12 @@ fn other_campaign(path: &Path, found: &str, wanted: &str) -> String {
     format!("{} {what}; take another --out, or fly again with --again", path.display())
 }
 
-/// Hash over this program: flights of another build are not this campaign's.
+/// Hash over this program: flights of another build are not this campaign's. The standard library's hash is fast in a
+/// debug build, too, whose program is large and is read by every task. It may change with the compiler, and then the
+/// build is another one anyway.
 fn program() -> Result<String, Failure> {
     let bytes = std::env::current_exe().and_then(std::fs::read).map_err(|error| format!("this program: {error}"))?;
-    let mut hash = FlightHash::new();
-    for (place, part) in bytes.chunks(1 << 16).enumerate() {
-        let words: Vec<u32> =
-            part.chunks(4).map(|word| word.iter().rev().fold(0, |bits, byte| bits << 8 | u32::from(*byte))).collect();
-        hash.publish(0, place as u32, Instant::from_micros(part.len() as u64), &words);
-    }
+    let mut hash = DefaultHasher::new();
+    hash.write(&bytes);
     Ok(format!("{:016x}", hash.finish()))
 }

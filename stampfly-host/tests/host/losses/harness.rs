@@ -3,6 +3,7 @@
 //! The simulator's executor flies the stack as in every mission, in surroundings of this test's own: without mission, log
 //! and figures; in exchange a script may use every command there is, press the button and silence the inertial sensor.
 
+use crate::thorough::is_thorough;
 use stampfly_board::VehicleConfig;
 use stampfly_board::messages::{ButtonContact, TelemetryFrame};
 use stampfly_board::schedule::Runnables;
@@ -39,6 +40,7 @@ pub struct Hands<'b> {
     pub lying: &'b Cell<Option<Instant>>,
     /// Range finder and barometer.
     pub height_silent: &'b Cell<bool>,
+    is_over: &'b Cell<bool>,
 }
 
 /// What a broken sensor makes of a sample, so many seconds after it broke.
@@ -101,6 +103,11 @@ impl Hands<'_> {
             scene.hand = holds.then_some(Hand { position: motion.position, attitude: motion.attitude });
         });
         now
+    }
+
+    /// Nothing more is to be seen: ends the flight. In the thorough size it goes on until its time is over.
+    pub fn leave(&self) {
+        self.is_over.set(!is_thorough());
     }
 
     /// Presses the button for a fifth of a second.
@@ -216,6 +223,7 @@ struct Stage<S> {
     lying: Cell<Option<Instant>>,
     lies: Lies,
     height_silent: Cell<bool>,
+    is_over: Cell<bool>,
     script: Option<S>,
     end: Instant,
 }
@@ -233,9 +241,9 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
     }
 
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: topics::Outside<'a>) -> Watch<'a> {
-        let Self { clock, world, sensors, imu_silent, height_silent, lying, lies, script, end } = self;
+        let Self { clock, world, sensors, imu_silent, height_silent, lying, lies, script, is_over, end } = self;
         let (imu_silent, height_silent): (&Cell<bool>, &Cell<bool>) = (imu_silent, height_silent);
-        let lying: &Cell<Option<Instant>> = lying;
+        let (lying, is_over): (&Cell<Option<Instant>>, &Cell<bool>) = (lying, is_over);
         let lies = std::mem::take(lies);
         let (sensors, script) = sensors.take().zip(script.take()).expect("started once");
         let Sensors { imu, tof, flow, mag, baro, power, motors, button, .. } = sensors;
@@ -262,9 +270,10 @@ impl<S: for<'b> FnOnce(Hands<'b>) -> Script<'b>> vehicle::Surroundings for Stage
             imu_silent,
             lying,
             height_silent,
+            is_over,
         }));
         let (duties, world, end) = (outside.motors.actuator_motor, world.clone(), *end);
-        Watch { world, duties, motors, end, seen: Seen::default() }
+        Watch { world, duties, motors, is_over, end, seen: Seen::default() }
     }
 }
 
@@ -273,6 +282,7 @@ struct Watch<'a> {
     world: World,
     duties: topics::ActuatorMotorRx<'a>,
     motors: MotorModel,
+    is_over: &'a Cell<bool>,
     end: Instant,
     seen: Seen,
 }
@@ -307,7 +317,7 @@ impl vehicle::Around for Watch<'_> {
     }
 
     fn is_over(&mut self, now: Instant) -> bool {
-        now >= self.end
+        now >= self.end || self.is_over.get()
     }
 
     fn finish(self) -> Seen {
@@ -334,8 +344,9 @@ pub fn run_in(
     let limit = Duration::from_seconds(seconds);
     let end = config.start + limit;
     let (sensors, script) = (Some(sensors), Some(script));
-    let (imu_silent, height_silent, lying) = (Cell::new(false), Cell::new(false), Cell::new(None));
-    let mut stage = Stage { clock, world, sensors, imu_silent, height_silent, lying, lies, script, end };
+    let [imu_silent, height_silent, is_over] = [const { Cell::new(false) }; 3];
+    let lying = Cell::new(None);
+    let mut stage = Stage { clock, world, sensors, imu_silent, height_silent, lying, lies, is_over, script, end };
     let options = FlightOptions { start: config.start, limit, jitter: None };
     let ended = vehicle::fly(&VehicleConfig::default(), &options, &mut stage, &mut (), &mut |_, _| {});
     assert_eq!(ended.log_lost, 0);

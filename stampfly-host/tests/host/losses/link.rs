@@ -1,7 +1,8 @@
 //! A link that is lost at any moment, in any mode: noticed in time, and a soft landing.
 //!
-//! Two seeds; `FLIGHTS=20` flies as many of each, and prints the longest time and the hardest touch.
+//! One seed, in the thorough size two; `FLIGHTS=20` flies as many of each, and prints the longest time and the hardest touch.
 
+use crate::thorough::flights;
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::flown::fly;
@@ -20,7 +21,7 @@ fn a_link_lost_at_any_moment_lands_softly() {
     let (mut longest, mut hardest, mut flown) = (0.0f64, 0.0f64, 0);
     for moment in Moment::ALL {
         for pilot in pilots.into_iter().chain([None]) {
-            for seed in 1..=crate::flights().unwrap_or(2) {
+            for seed in 1..=flights(1, 2) {
                 let (noticed, touch) = lose(moment, pilot, seed);
                 flown += 1;
                 longest = longest.max(noticed);

@@ -3,11 +3,14 @@
 pub mod harness;
 mod link;
 
+use crate::thorough::thorough;
 use harness::{STICKS, Seen, instant, run};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
+fn seeds() -> std::ops::RangeInclusive<u64> {
+    1..=thorough(2, 4)
+}
 
 /// A control period: the vehicle's inertial sensor may be 2 % slow.
 const PERIOD: Duration = Duration::from_micros(2_551);
@@ -34,7 +37,7 @@ fn hovers_then_lands(seed: u64, seen: &Seen, silent_since: Instant) {
 
 #[test]
 fn a_silent_ground_station() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 30.0, |mut hands| {
             Box::pin(async move {
@@ -51,7 +54,7 @@ fn a_silent_ground_station() {
 /// flying forward.
 #[test]
 fn a_silent_pilot() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 35.0, |mut hands| {
             Box::pin(async move {
@@ -92,7 +95,7 @@ fn a_link_that_comes_back_in_time() {
 
 #[test]
 fn kill_stops_the_motors_within_a_control_period() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 15.0, |mut hands| {
             Box::pin(async move {
@@ -122,7 +125,7 @@ fn kill_stops_the_motors_within_a_control_period() {
 /// flight band any more.
 #[test]
 fn a_silent_inertial_sensor() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 20.0, |mut hands| {
             Box::pin(async move {
@@ -168,7 +171,7 @@ fn a_hiccup_of_the_inertial_sensor() {
 /// of this press means nothing.
 #[test]
 fn a_button_takes_off_and_stops_the_motors() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let (since, note) = instant();
         let seen = run(seed, 30.0, |mut hands| {
             Box::pin(async move {

@@ -1,7 +1,8 @@
 //! A log that was damaged anywhere: an error, a difference or nothing, but never a panic.
 
 use super::places::{Place, key_frame_parts, places};
-use super::{record, replay, replay_from, setup};
+use super::{record, replay, replay_from};
+use crate::flown::hop;
 use proptest::prelude::*;
 use stampfly_board::simulation::Setup;
 use stampfly_types::{Duration, Instant};
@@ -10,7 +11,7 @@ use std::sync::LazyLock;
 
 /// The first second of a flight: small enough to be damaged many times.
 static SECOND: LazyLock<Vec<u8>> =
-    LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..setup(1, Some(1)) }));
+    LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..hop(1, Some(1)) }));
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]

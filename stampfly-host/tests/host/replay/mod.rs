@@ -3,9 +3,10 @@
 mod damage;
 mod places;
 
+use crate::flown::{HOP, Hop, LATE, hop};
+use crate::thorough::thorough;
 use places::{find, key_frame_parts, messages, offset, places, without, without_key_frames};
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
-use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_board::{EstimatorKind, VehicleConfig, topics};
 use stampfly_flight::replay::{self, Difference, Replay, ReplayError, ReplayOptions};
@@ -19,13 +20,8 @@ use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Message a
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// Everything in the mission that makes the stack do something.
-pub fn setup(seed: u64, jitter: Option<u64>) -> Setup {
-    let mission = Mission::parse("arm\ntakeoff 0.4\ngoto 0.5 -0.3 0.6 yaw 60\nland").expect("a mission");
-    Setup { mission, jitter, ..Setup::reference(seed) }
-}
-
-pub fn record(setup: &Setup) -> Vec<u8> {
+/// The log of a flight.
+fn record(setup: &Setup) -> Vec<u8> {
     let mut recorder = Recorder::<StampFly>::with_log(setup, &[("seed".to_owned(), setup.simulation.seed.to_string())]);
     fly::<StampFly>(setup, &mut recorder, &mut |_, _| {});
     recorder.log().to_vec()
@@ -40,9 +36,6 @@ fn replay_from(log: &[u8], from: Option<Instant>) -> Result<Replay, ReplayError>
     replay::replay::<Runnables>(log, VehicleConfig::default(), set, ReplayOptions { from, ..Default::default() })
 }
 
-/// A flight that landed, once for all tests that damage it.
-static FLIGHT: LazyLock<Vec<u8>> = LazyLock::new(|| record(&setup(1, None)));
-
 /// The topics of a log of ours.
 static TOPICS: LazyLock<Vec<Topic>> = LazyLock::new(|| {
     let of_the_bus = topics::TOPICS.iter().map(|info| Topic { name: info.name, fields: info.fields });
@@ -55,8 +48,9 @@ fn difference(log: &[u8]) -> Difference {
 
 #[test]
 fn flights_replay_bit_for_bit() {
-    for (seed, jitter) in [(1, None), (2, None), (3, Some(1)), (4, Some(2)), (5, Some(3)), (6, Some(4))] {
-        let mut setup = setup(seed, jitter);
+    let all = [(4, Some(2)), (1, None), (2, None), (3, Some(1)), (5, Some(3)), (6, Some(4))];
+    for (seed, jitter) in &all[..thorough(2, all.len())] {
+        let mut setup = hop(*seed, *jitter);
         // Stamps beyond 32 bits, too.
         setup.simulation.start = Instant::from_micros(if seed % 2 == 0 { (1 << 32) - 6_000_000 } else { 0 });
         let log = record(&setup);
@@ -71,19 +65,18 @@ fn flights_replay_bit_for_bit() {
 
 #[test]
 fn a_replay_begins_at_any_key_frame() {
-    for jitter in [None, Some(1)] {
-        let log = record(&setup(1, jitter));
-        let whole = replay(&log).expect("a log that can be replayed");
+    for (jitter, Hop { log, .. }) in [(None, &*HOP), (Some(1), &*LATE)] {
+        let whole = replay(log).expect("a log that can be replayed");
         for from in [0.5, 3.0, 5.7, 7.3] {
-            let result = replay_from(&log, Some(Instant::ZERO + Duration::from_seconds(from)));
+            let result = replay_from(log, Some(Instant::ZERO + Duration::from_seconds(from)));
             let result = result.unwrap_or_else(|error| panic!("from {from} s of {}: {error}", whole.duration));
             assert_eq!((&result.difference, result.gaps), (&None, 0), "from {from} s, jitter {jitter:?}");
             assert_eq!(result.activations + result.skipped, whole.activations, "{result:?}");
             let left_out = whole.duration.seconds() - result.duration.seconds();
             assert!((from - 0.1..from + 1.1).contains(&left_out), "from {from} s: {result:?}");
         }
-        assert_eq!(replay_from(&log, Some(Instant::from_secs(3_600))), Err(ReplayError::NoKeyFrame));
-        let none = without_key_frames(&log);
+        assert_eq!(replay_from(log, Some(Instant::from_secs(3_600))), Err(ReplayError::NoKeyFrame));
+        let none = without_key_frames(log);
         assert_eq!(replay_from(&none, Some(Instant::from_secs(3))), Err(ReplayError::NoKeyFrame));
         let result = replay(&none).expect("from power-on");
         assert_eq!(result, Replay { key_frames: 0, ..whole });
@@ -92,7 +85,7 @@ fn a_replay_begins_at_any_key_frame() {
 
 #[test]
 fn parameters_come_from_the_log() {
-    let mut setup = setup(1, None);
+    let mut setup = hop(1, None);
     setup.vehicle.cascade.altitude.height_gain *= 1.5;
     setup.vehicle.estimator = EstimatorKind::Complementary;
     setup.limit = Duration::from_secs(8);
@@ -131,16 +124,16 @@ fn disorder(log: &[u8]) -> (usize, usize) {
 /// Without this, replaying flights with jitter would prove no more than replaying flights without.
 #[test]
 fn jitter_does_disturb() {
-    let (waited, interrupted) = disorder(&FLIGHT);
+    let (waited, interrupted) = disorder(&HOP.log);
     assert!(interrupted == 0 && waited < 5, "an executor that is never late: {waited} {interrupted}");
-    let (waited, interrupted) = disorder(&record(&setup(1, Some(1))));
+    let (waited, interrupted) = disorder(&LATE.log);
     assert!(waited > 50, "estimation was late {waited} times");
     assert!(interrupted > 20, "telemetry was interrupted {interrupted} times");
 }
 
 #[test]
 fn one_flipped_bit_is_found_and_named() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let place = find(log, "sensor_imu", Instant::from_secs(7));
     let accel = offset(log, "sensor_imu", "accel", Some(0));
     let mut changed = log.clone();
@@ -169,7 +162,7 @@ fn one_flipped_bit_is_found_and_named() {
 /// What a component has learned shows in its state before it shows in what it publishes.
 #[test]
 fn another_state_is_found_too() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let parts = key_frame_parts(log);
     let part = &parts[parts.len() / 2];
     let mut changed = log.clone();
@@ -180,7 +173,7 @@ fn another_state_is_found_too() {
 
 #[test]
 fn a_changed_parameter_or_output_is_found_too() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let mut changed = log.clone();
     let name = b"position.pos.kp";
     let at = log.windows(name.len()).position(|window| window == name).expect("the parameter is in the log");
@@ -204,7 +197,7 @@ fn goes_on(lossy: &[u8], what: &str) {
 /// A log that lost something says so with a mark.
 #[test]
 fn a_loss_that_is_marked_is_passed_over() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let place = find(log, "sensor_imu", Instant::from_secs(7)).message();
     // Size, type and milliseconds.
     let mark = [2, 0, b'O', 5, 0];
@@ -220,7 +213,7 @@ fn a_loss_that_is_marked_is_passed_over() {
 
 #[test]
 fn what_is_missing_is_found() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     // Not when a key frame is made: it holds the samples that nothing has read yet, and shows the loss first.
     let at = Instant::from_millis(7_300);
     for (topic, reader) in [("sensor_imu", "estimation"), ("sensor_power", "failsafe"), ("command_guided", "failsafe")]
@@ -253,7 +246,7 @@ fn what_is_missing_is_found() {
 
 #[test]
 fn the_last_output_missing_its_activation_is_found() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let last = places(log).into_iter().rfind(|place| place.topic == "activation_telemetry").expect("telemetry");
     let found = difference(&without(log, last.message()));
     assert_eq!((found.topic.as_str(), found.replayed.as_str()), ("telemetry", "nothing"), "{found}");
@@ -261,7 +254,7 @@ fn the_last_output_missing_its_activation_is_found() {
 
 #[test]
 fn a_log_that_was_cut_off_is_refused_with_the_place() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let place = find(log, "sensor_imu", Instant::from_secs(7));
     let cut = place.payload.start + 3;
     match replay(&log[..cut]) {
@@ -275,11 +268,12 @@ fn a_log_that_was_cut_off_is_refused_with_the_place() {
 /// The vehicle was switched off while it wrote: every whole message is worth replaying.
 #[test]
 fn a_log_that_was_cut_between_two_messages_is_no_difference() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let messages = messages(log);
     let middle = find(log, "sensor_imu", Instant::from_secs(7)).message().start;
     let first = messages.iter().position(|(_, bytes)| bytes.start == middle).expect("a message");
-    for (kind, bytes) in &messages[first..first + 40] {
+    // A replay for each, of seven seconds.
+    for (kind, bytes) in &messages[first..first + thorough(12, 40)] {
         let result = replay(&log[..bytes.end]).expect("a log that can be replayed");
         assert_eq!(result.difference, None, "cut behind a message '{}' at {}", char::from(*kind), bytes.end);
         assert!(result.activations > 10_000 && result.gaps == 0, "{result:?}");
@@ -289,7 +283,7 @@ fn a_log_that_was_cut_between_two_messages_is_no_difference() {
 /// The same where a key frame, which is several messages, is written.
 #[test]
 fn a_log_that_was_cut_in_a_key_frame_is_no_difference() {
-    let log = &*FLIGHT;
+    let log = &HOP.log;
     let parts = key_frame_parts(log);
     let frames: Vec<_> = parts.chunk_by(|a, b| a.end == b.start).collect();
     let frame = frames[frames.len() / 2];

@@ -36,7 +36,7 @@ fn lies() -> Vec<(&'static str, Lie, f32)> {
 
 #[test]
 fn d8_flow_that_lies_is_found_and_does_not_crash_the_vehicle() {
-    for seed in SEEDS {
+    for seed in seeds() {
         for (what, lie, within) in lies() {
             let lies = Lies { flow: Some(lie), ..Lies::default() };
             let (seen, since) = fly(seed, 30.0, Onset::After(FlightPhase::Flying, 0.5), lies);

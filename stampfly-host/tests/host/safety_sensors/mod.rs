@@ -1,6 +1,7 @@
 //! What the whole vehicle does when a sensor lies in flight.
 
 use crate::losses::harness::{Lies, Seen, run_in};
+use crate::thorough::thorough;
 use stampfly_sim::SimulationConfig;
 use stampfly_types::messages::{Alerts, FlightPhase, FlowData, GuidedKind, ImuData, TofData, Validity};
 use stampfly_types::{Duration, Instant, Vec3};
@@ -12,7 +13,12 @@ mod inertial;
 mod nominal;
 mod ranges;
 
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
+fn seeds() -> std::ops::RangeInclusive<u64> {
+    1..=thorough(1, 3)
+}
+
+/// A vehicle whose motors have stopped is watched for so long, s.
+const WATCHED: f32 = 3.0;
 
 /// When a flight's sensors begin to lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +53,7 @@ fn fly_in(
             hands.command(GuidedKind::Arm);
             let mut wait = 400.0;
             let mut phase = FlightPhase::IdleGround;
-            let mut asked = 0;
+            let (mut asked, mut stands) = (0, 0.0);
             loop {
                 hands.sleep(0.02).await;
                 wait += 0.02;
@@ -70,6 +76,10 @@ fn fly_in(
                 };
                 asked += u32::from(kind != GuidedKind::None);
                 hands.command(kind);
+                stands = if asked > 0 && !frame.armed { stands + 0.02 } else { 0.0 };
+                if stands > WATCHED {
+                    hands.leave();
+                }
             }
         })
     });

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn sensors_that_measure_raise_no_alert() {
-    let flights = crate::flights().unwrap_or(4);
+    let flights = crate::thorough::flights(2, 4);
     let mut found = Vec::new();
     for seed in 1..=flights {
         let windy = |simulation: &mut SimulationConfig| {
@@ -70,7 +70,7 @@ fn random_missions_in_gusts_raise_no_alert() {
         let pilot: &[&str] = if by == "program" { &[] } else { &["--pilot", "--mode", by] };
         let gusts = |seed| [&["--gust", "1", "--seed", seed], pilot].concat();
         seeds.iter().for_each(|seed| fly_at_random(&gusts(seed), 1, &["transparent", "degraded"]));
-        if let Some(all) = crate::flights() {
+        if let Some(all) = crate::thorough::asked_for() {
             fly_at_random(&gusts("1"), all, &ENDS);
             println!("{by}: {all} flights, no alert but LOW_BATTERY, none refused");
         }

@@ -31,7 +31,7 @@ fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
 
 #[test]
 fn d1_a_range_that_lies_does_not_carry_the_vehicle_away() {
-    for seed in SEEDS {
+    for seed in seeds() {
         for (what, lie, highest, within) in lies() {
             let lies = Lies { tof: Some(lie), ..Lies::default() };
             let (seen, since) = fly(seed, 40.0, Onset::After(FlightPhase::Flying, 2.0), lies);
@@ -53,7 +53,7 @@ fn d1_a_range_that_lies_does_not_carry_the_vehicle_away() {
 
 #[test]
 fn d1_a_range_stuck_from_the_take_off_on_does_not_carry_the_vehicle_away() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let lie: Lie = Box::new(|_, tof| (tof.distance, tof.valid) = (0.03, true));
         let lies = Lies { tof: Some(lie), ..Lies::default() };
         let (seen, since) = fly(seed, 40.0, Onset::After(FlightPhase::Armed, 0.3), lies);
@@ -67,7 +67,7 @@ fn d1_a_range_stuck_from_the_take_off_on_does_not_carry_the_vehicle_away() {
 
 #[test]
 fn d1_a_range_that_recovers_is_believed_again() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let lie: Lie = Box::new(|t, tof| {
             if t < 2.0 {
                 (tof.distance, tof.valid) = (0.03, true);

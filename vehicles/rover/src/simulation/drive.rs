@@ -90,6 +90,10 @@ impl Script for Setup {
         (limit.as_micros() / TICK.as_micros()) as usize
     }
 
+    fn is_ended(&self) -> bool {
+        matches!(&self.driver, Driver::Live(live) if live.ports.are_closed())
+    }
+
     fn judge(&self, lines: Vec<LogRecord>) -> Drive {
         let mut stopping = 0;
         let stops = lines.iter().all(|line| {
