@@ -38,8 +38,19 @@ pub const PROFILES: [&str; 2] = ["llvm-profdata-22", "llvm-cov-22"];
 pub const COVERAGE: Tool = Tool { packages: &["llvm-22"], is_there: || PROFILES.iter().all(|tool| exists(tool)) };
 /// Without a window. A download of its own is nothing that we would have to trust.
 pub const BROWSER: Tool = Tool { packages: &["chromium"], is_there: || exists("/usr/bin/chromium") };
-pub const ALL: [&Tool; 9] =
-    [&VALGRIND, &EMULATED_ARM, &EMULATED_OTHERS, &COMPILER, &CLIPPY, &LINKER, &XTENSA, &COVERAGE, &BROWSER];
+pub const SHELLCHECK: Tool = Tool { packages: &["shellcheck"], is_there: || exists("shellcheck") };
+pub const ALL: [&Tool; 10] = [
+    &VALGRIND,
+    &EMULATED_ARM,
+    &EMULATED_OTHERS,
+    &COMPILER,
+    &CLIPPY,
+    &LINKER,
+    &XTENSA,
+    &COVERAGE,
+    &BROWSER,
+    &SHELLCHECK,
+];
 
 /// Is there such a program, and does it run?
 pub fn exists(program: &str) -> bool {

@@ -65,6 +65,7 @@ const STEPS: &[Step] = &[
         .after(&["program"])
         .accepting(&[File]),
     Step::ci("python", "Run the tests of the Python example, check its types", steps::python::run),
+    Step::ci("workflows", "Check GitHub's workflows and the scripts they run", steps::workflows::run),
     // Every night.
     Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .accepting(&[Fix, Rest]),
@@ -110,6 +111,7 @@ const STEPS: &[Step] = &[
         "Build each crate from its package, and run the first example of its README",
         steps::package::run,
     ),
+    Step::nightly("platforms", "Check everything of a PC for Windows and macOS", steps::platforms::run),
     Step::nightly("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run),
     Step::nightly("semver", "Compare each library's interface with the last release's", steps::semver::run),
     Step::nightly("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),
