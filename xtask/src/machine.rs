@@ -39,7 +39,10 @@ pub const COVERAGE: Tool = Tool { packages: &["llvm-22"], is_there: || PROFILES.
 /// Without a window. A download of its own is nothing that we would have to trust.
 pub const BROWSER: Tool = Tool { packages: &["chromium"], is_there: || exists("/usr/bin/chromium") };
 pub const SHELLCHECK: Tool = Tool { packages: &["shellcheck"], is_there: || exists("shellcheck") };
-pub const ALL: [&Tool; 10] = [
+/// What links programs for Windows, and what runs them.
+pub const MINGW: Tool = Tool { packages: &["gcc-mingw-w64-x86-64"], is_there: || exists("x86_64-w64-mingw32-gcc") };
+pub const WINE: Tool = Tool { packages: &["wine64"], is_there: || exists("/usr/lib/wine/wine64") };
+pub const ALL: [&Tool; 12] = [
     &VALGRIND,
     &EMULATED_ARM,
     &EMULATED_OTHERS,
@@ -50,6 +53,8 @@ pub const ALL: [&Tool; 10] = [
     &COVERAGE,
     &BROWSER,
     &SHELLCHECK,
+    &MINGW,
+    &WINE,
 ];
 
 /// Is there such a program, and does it run?

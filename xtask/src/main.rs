@@ -111,6 +111,8 @@ const STEPS: &[Step] = &[
         "Build each crate from its package, and run the first example of its README",
         steps::package::run,
     ),
+    Step::nightly("windows", "Fly with the program for Windows: the same bytes", steps::windows::run)
+        .holding(&[Release]),
     Step::nightly("platforms", "Check everything of a PC for Windows and macOS", steps::platforms::run),
     Step::nightly("msrv", "Hold the libraries to the Rust version they promise", steps::msrv::run),
     Step::nightly("semver", "Compare each library's interface with the last release's", steps::semver::run),

@@ -52,4 +52,5 @@ pub mod stm32;
 pub mod test;
 pub mod ulog;
 pub mod vectors;
+pub mod windows;
 pub mod workflows;
