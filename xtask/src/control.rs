@@ -3,7 +3,8 @@
 use crate::repository::{Failure, Repository};
 use std::fmt::Write;
 use std::fs;
-use toml_edit::{DocumentMut, Item, Table};
+use std::path::PathBuf;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
 /// Its path in the repository.
 const FILE: &str = "xtask/controls.toml";
@@ -20,6 +21,8 @@ pub struct Control {
     pub what: String,
     /// Text that the step has to write.
     pub says: String,
+    /// The line in which it wrote that, when the control was tried last.
+    pub said: Option<String>,
     pub changes: Vec<Change>,
     /// Environment variables for the step.
     pub environment: Vec<(String, String)>,
@@ -46,28 +49,51 @@ impl Change {
     }
 }
 
-/// The list.
+/// The list and the file that it comes from.
 pub struct List {
+    path: PathBuf,
+    document: DocumentMut,
     pub controls: Vec<Control>,
 }
 
 impl List {
     pub fn read(repository: &Repository) -> Result<Self, Failure> {
-        let text = fs::read_to_string(repository.root.join(FILE)).map_err(|e| format!("{FILE}: {e}"))?;
-        Self::parse(&text).map_err(|e| format!("{FILE}: {e}"))
+        let path = repository.root.join(FILE);
+        let text = fs::read_to_string(&path).map_err(|e| format!("{FILE}: {e}"))?;
+        Self::parse(&text, path).map_err(|e| format!("{FILE}: {e}"))
     }
 
-    fn parse(text: &str) -> Result<Self, Failure> {
+    fn parse(text: &str, path: PathBuf) -> Result<Self, Failure> {
         let document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
         let tables = document.get("control").and_then(Item::as_array_of_tables).ok_or("no `[[control]]`")?;
-        Ok(Self { controls: tables.iter().map(control).collect::<Result<_, _>>()? })
+        let controls = tables.iter().map(control).collect::<Result<_, _>>()?;
+        Ok(Self { path, document, controls })
+    }
+
+    /// Records what a step said, and writes the file. Its comments survive.
+    pub fn record(&mut self, step: &str, said: &str) -> Result<(), Failure> {
+        let tables = self.document.get_mut("control").and_then(Item::as_array_of_tables_mut);
+        let of_step = |table: &&mut Table| table.get("step").and_then(Item::as_str) == Some(step);
+        if let Some(table) = tables.and_then(|tables: &mut ArrayOfTables| tables.iter_mut().find(of_step)) {
+            table["said"] = value(said);
+        }
+        for control in self.controls.iter_mut().filter(|control| control.step == step) {
+            control.said = Some(said.to_owned());
+        }
+        fs::write(&self.path, self.document.to_string()).map_err(|e| format!("{FILE}: {e}"))
     }
 
     /// The table of the document.
     pub fn table(&self) -> String {
-        let mut text = String::from("\n| step | broken | what it says |\n|---|---|---|\n");
-        for Control { step, what, says, .. } in &self.controls {
-            let _ = writeln!(text, "| `{step}` | {} | `{}` |", what.replace('|', "\\|"), says.replace('|', "\\|"));
+        let mut text = String::from("\n| step | broken | what it said |\n|---|---|---|\n");
+        for Control { step, what, said, .. } in &self.controls {
+            let what = what.replace('|', "\\|");
+            let _ = match said {
+                Some(said) => {
+                    writeln!(text, "| `{step}` | {what} | `{}` |", said.replace('|', "\\|").replace('`', "'"))
+                }
+                None => writeln!(text, "| `{step}` | {what} | not tried yet |"),
+            };
         }
         text + "\n"
     }
@@ -87,6 +113,7 @@ fn control(table: &Table) -> Result<Control, Failure> {
         step: text(table, "step")?,
         what: text(table, "what")?,
         says: text(table, "says")?,
+        said: table.get("said").and_then(Item::as_str).map(str::to_owned),
         changes: changes.map(change).collect::<Result<_, _>>()?,
         environment: variables
             .map(|(key, value)| (key.to_owned(), value.as_str().unwrap_or_default().to_owned()))
@@ -108,14 +135,20 @@ mod tests {
     }
 
     #[test]
-    fn a_list_is_read_and_printed() {
-        let text = "[[control]]\nstep = \"fmt\"\nwhat = \"a | b\"\nsays = \"Diff\"\nenvironment = { CI = \"true\" }\n\
+    fn a_list_is_read_printed_and_written() {
+        let text = "# Why.\n[[control]]\nstep = \"fmt\"\nwhat = \"a | b\"\nsays = \"Diff\"\nenvironment = { CI = \"true\" }\n\
                     [[control.change]]\nfile = \"a.rs\"\nright = \"x\"\nwrong = \"y\"\n";
-        let list = List::parse(text).expect("a list");
+        let path = std::env::temp_dir().join(format!("stampfly-controls-{}.toml", std::process::id()));
+        let mut list = List::parse(text, path.clone()).expect("a list");
         let change = Change { file: "a.rs".into(), right: "x".into(), wrong: "y".into() };
         assert_eq!(list.controls[0].changes, [change]);
         assert_eq!(list.controls[0].environment, [("CI".into(), "true".into())]);
-        assert!(list.table().contains("| `fmt` | a \\| b | `Diff` |"));
-        assert!(List::parse("[[control]]\nstep = \"fmt\"\n").is_err());
+        assert!(list.table().contains("| `fmt` | a \\| b | not tried yet |"));
+        list.record("fmt", "Diff in a.rs").expect("written");
+        assert!(list.table().contains("| `fmt` | a \\| b | `Diff in a.rs` |"));
+        let written = fs::read_to_string(&path).expect("the file");
+        assert!(written.starts_with("# Why.\n") && written.contains("said = \"Diff in a.rs\""), "{written}");
+        fs::remove_file(&path).expect("the file");
+        assert!(List::parse("[[control]]\nstep = \"fmt\"\n", path).is_err());
     }
 }

@@ -67,6 +67,8 @@ const STEPS: &[Step] = &[
     Step::ci("python", "Run the tests of the Python example, check its types", steps::python::run),
     Step::ci("workflows", "Check GitHub's workflows and the scripts they run", steps::workflows::run),
     // Every night.
+    Step::nightly("thorough", "Run the tests that fly with all of their seeds", steps::test::thorough)
+        .holding(&[Debug]),
     Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .accepting(&[Fix, Rest]),
     Step::nightly("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)

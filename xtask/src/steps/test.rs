@@ -6,8 +6,22 @@
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, in_ci, run as run_program};
+use std::process::Command;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
+    run_program(test(repository)?.args(&arguments.rest))?;
+    // Not among the default members, so that `cargo test` at home builds only what flies.
+    run_program(repository.cargo().args(["test", "--quiet", "-p", "xtask"]))
+}
+
+/// `thorough`: the tests that fly, with all of their seeds.
+pub fn thorough(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    // By the name of the program and not of its package, whose features alone would build everything again.
+    run_program(test(repository)?.env("STAMPFLY_THOROUGH", "1").args(["--test", "host"]))
+}
+
+/// `cargo test`, which is told where the recorded flights are.
+fn test(repository: &Repository) -> Result<Command, Failure> {
     let data = repository.data();
     match &data {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),
@@ -15,10 +29,9 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         None => eprintln!("recorded data: none (STAMPFLY_DATA names its folder)"),
     }
     let mut test = repository.cargo();
+    test.arg("test");
     if let Some(folder) = data {
         test.env("STAMPFLY_DATA", folder);
     }
-    run_program(test.arg("test").args(&arguments.rest))?;
-    // Not among the default members, so that `cargo test` at home builds only what flies.
-    run_program(repository.cargo().args(["test", "--quiet", "-p", "xtask"]))
+    Ok(test)
 }
