@@ -11,7 +11,7 @@ use std::io::Cursor;
 #[test]
 fn a_part_of_a_flight_replays_bit_for_bit() {
     let whole = &Hop::fly(&hop(3, None)).log;
-    let length = Info::of(&flight_log::parse(&whole).expect("a log")).last_s;
+    let length = Info::of(&flight_log::parse(whole).expect("a log")).last_s;
     for (from, to) in [(0.0, 4.0), (4.0, 9.5), (length - 3.0, length + 10.0)] {
         let instant = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
         let part = cut::cut(whole, instant(from), instant(to)).expect("a log");
