@@ -74,8 +74,9 @@ fn rate_correlation(recording: &Recording, window: Duration) -> Vec3 {
 #[test]
 #[cfg_attr(not(recorded_data), ignore = "set STAMPFLY_DATA to the recorded data")]
 fn stampfly_logs_are_read_whole() {
+    // The folder grows: a recording that is added has to be read as well.
     let logs = load_all("stampfly_logs", "csv");
-    assert_eq!(logs.len(), 12);
+    assert!(logs.len() >= 12, "{}", logs.len());
     for (name, log) in &logs {
         assert_eq!(log.kind, Kind::StampFlyLog, "{name}");
         assert!(log.imu.len() > 1_200 && log.timing.not_finite == 0, "{name}: {:?}", log.timing);
@@ -91,7 +92,8 @@ fn stampfly_logs_are_read_whole() {
         let down = mean(log.imu.iter().take(100).map(|s| s.data.accel)).z;
         assert!((-10.3..-9.3).contains(&down), "{name}: {down} m/s² along z");
     }
-    assert_eq!(logs.iter().filter(|(_, log)| !log.mag.is_empty()).count(), 6, "25 columns");
+    let with_mag = logs.iter().filter(|(_, log)| !log.mag.is_empty()).count();
+    assert!((6..logs.len()).contains(&with_mag), "{with_mag} logs have 25 columns, the others 22");
 }
 
 #[test]

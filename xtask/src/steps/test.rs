@@ -29,7 +29,8 @@ fn test(repository: &Repository) -> Result<Command, Failure> {
         None => eprintln!("recorded data: none (STAMPFLY_DATA names its folder)"),
     }
     let mut test = repository.cargo();
-    test.arg("test");
+    // A test that fails hides no other one.
+    test.args(["test", "--no-fail-fast"]);
     if let Some(folder) = data {
         test.env("STAMPFLY_DATA", folder);
     }
