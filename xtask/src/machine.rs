@@ -1,7 +1,7 @@
 //! Programs that steps need besides a Rust toolchain: whether they are there, and what Debian calls them.
 //!
 //! A tool is there when what is used of it is there, not when something of the same name is. A step asks for its tools with
-//! [`provide`]; the step `machine` asks for all of them before anything is built.
+//! [`provide`]; the step `machine` lists those of `ci` before anything is built.
 
 use crate::repository::{Failure, Repository, run};
 use std::fs::File;
@@ -42,20 +42,8 @@ pub const SHELLCHECK: Tool = Tool { packages: &["shellcheck"], is_there: || exis
 /// What links programs for Windows, and what runs them.
 pub const MINGW: Tool = Tool { packages: &["gcc-mingw-w64-x86-64"], is_there: || exists("x86_64-w64-mingw32-gcc") };
 pub const WINE: Tool = Tool { packages: &["wine64"], is_there: || exists("/usr/lib/wine/wine64") };
-pub const ALL: [&Tool; 12] = [
-    &VALGRIND,
-    &EMULATED_ARM,
-    &EMULATED_OTHERS,
-    &COMPILER,
-    &CLIPPY,
-    &LINKER,
-    &XTENSA,
-    &COVERAGE,
-    &BROWSER,
-    &SHELLCHECK,
-    &MINGW,
-    &WINE,
-];
+/// What the steps of `ci` need. A step of the night asks for its own when it runs.
+pub const FOR_CI: [&Tool; 6] = [&COMPILER, &CLIPPY, &LINKER, &XTENSA, &BROWSER, &SHELLCHECK];
 
 /// Is there such a program, and does it run?
 pub fn exists(program: &str) -> bool {

@@ -141,6 +141,11 @@ pub fn in_ci() -> bool {
     std::env::var("CI").is_ok_and(|value| value == "true")
 }
 
+/// Does `STAMPFLY_DATA=none` say that the checks run without the recorded flights?
+pub fn without_recorded_flights() -> bool {
+    std::env::var_os("STAMPFLY_DATA").is_some_and(|value| value == "none")
+}
+
 /// A text before, between and after two marks.
 fn split<'t>(text: &'t str, begin: &str, end: &str) -> Option<[&'t str; 3]> {
     let (head, rest) = text.split_once(begin)?;

@@ -1,10 +1,10 @@
-//! `machine`: is everything there that the steps need? One list of what is not, with the commands, before anything is built.
+//! `machine`: what is missing that the steps of `ci` need, with the commands to get it, before anything is built.
 //!
 //! Debian's packages are installed by the steps themselves where that is possible, which is as root with `apt-get`.
 
 use crate::arguments::Arguments;
-use crate::machine::{ALL, exists, installing, missing};
-use crate::repository::{Failure, Repository, capture, in_ci};
+use crate::machine::{FOR_CI, exists, installing, missing};
+use crate::repository::{Failure, Repository, capture, in_ci, without_recorded_flights};
 use std::process::{Command, Stdio};
 
 /// Programs that no step installs, and how to.
@@ -27,10 +27,10 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let parts = PARTS.iter().filter(|(test, _)| !works(repository, test)).map(|(_, command)| *command);
     let mut wanted: Vec<String> = programs.chain(parts).map(str::to_owned).collect();
     // Elsewhere a test without them still means something.
-    if in_ci() && repository.data().is_none() {
+    if in_ci() && repository.data().is_none() && !without_recorded_flights() {
         wanted.push("export STAMPFLY_DATA=the folder of the recorded flights".to_owned());
     }
-    let packages = missing(&ALL);
+    let packages = missing(&FOR_CI);
     if !packages.is_empty() && installs(repository) {
         println!("steps will install {packages:?}");
     } else if !packages.is_empty() {
