@@ -36,7 +36,7 @@ impl Passed {
         Ok(Self { path, commit, steps })
     }
 
-    /// What a step that has passed took, s.
+    /// Duration of a step that has passed, s.
     pub fn seconds(&self, step: &str) -> Option<f64> {
         self.steps.iter().find(|(name, _)| name == step).map(|(_, seconds)| *seconds)
     }

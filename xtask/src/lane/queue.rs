@@ -9,7 +9,7 @@ pub struct Queue<'s> {
     running: Vec<&'s Step>,
 }
 
-/// What a job does next.
+/// The next action of a job.
 pub enum Next<'s> {
     /// Runs this step.
     Start(&'s Step),

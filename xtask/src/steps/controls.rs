@@ -84,7 +84,7 @@ fn said(repository: &Repository, clone: &Path, control: &Control) -> Result<(boo
     let mut xtask = repository.cargo();
     xtask.current_dir(clone).args(["run", "--quiet", "--package", "xtask", "--", &control.step]);
     xtask.env("CARGO_TARGET_DIR", repository.target(FOLDER).join("target")).env("CARGO_INCREMENTAL", "0");
-    // The clone is not beside the recorded flights.
+    // The clone has no recorded flights next to it.
     if let Some(data) = repository.data() {
         xtask.env("STAMPFLY_DATA", data);
     }
