@@ -2,6 +2,7 @@
 //!
 //! | module | what it is |
 //! |---|---|
+//! | [`command_line`] | the commands of the program `stampfly`, which has nothing else inside |
 //! | [`vehicles`] | the list of vehicles: the only place that names one |
 //! | [`flown`] | one simulated flight, with its figures |
 //! | [`campaign`] | many flights in parallel |
@@ -19,6 +20,7 @@
 //! [`Vehicle`](stampfly_sim::vehicle::Vehicle).
 
 pub mod campaign;
+pub mod command_line;
 pub mod connect;
 pub mod doctor;
 pub mod flown;

@@ -1,11 +1,11 @@
 //! `stampfly estimate`: the estimator over recorded data. Exit code 1 when a file could not be used.
 
-use crate::arguments::EstimateOptions;
-use crate::failure::Failure;
-use crate::terminal;
+use crate::Report;
+use crate::command_line::arguments::EstimateOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::terminal;
+use crate::report::Metric;
 use serde::Serialize;
-use stampfly_host::Report;
-use stampfly_host::report::Metric;
 use stampfly_lab::Recording;
 use stampfly_lab::dataset::{self, Kind};
 use stampfly_lab::estimate::{self, Estimated, Figures};

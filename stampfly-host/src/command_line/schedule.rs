@@ -1,10 +1,10 @@
 //! `stampfly schedule`: the activation table, with the response times that follow from it.
 
-use crate::arguments::TopicsOptions;
-use crate::failure::Failure;
+use crate::command_line::arguments::TopicsOptions;
+use crate::command_line::failure::Failure;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_bus::{ActivationInfo, Band, Schedule, TopicInfo, TopicTable, Trigger, response_time};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Duration;
 use std::process::ExitCode;

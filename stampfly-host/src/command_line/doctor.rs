@@ -1,11 +1,11 @@
 //! `stampfly doctor`: a newcomer and his vehicle, or an emulated one.
 
-use crate::arguments::DoctorOptions;
-use crate::failure::Failure;
+use crate::command_line::arguments::DoctorOptions;
+use crate::command_line::failure::Failure;
+use crate::doctor::console::Serial;
+use crate::doctor::newcomer::Newcomer;
+use crate::doctor::{Chart, emulated, examine};
 use stampfly_board::simulation::bench::fault;
-use stampfly_host::doctor::console::Serial;
-use stampfly_host::doctor::newcomer::Newcomer;
-use stampfly_host::doctor::{Chart, emulated, examine};
 use std::io::{BufRead, stdin, stdout};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};

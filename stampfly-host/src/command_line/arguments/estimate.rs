@@ -1,6 +1,6 @@
 //! An estimator over recorded data: `estimate`.
 
-use crate::failure::Failure;
+use crate::command_line::failure::Failure;
 use clap::{Args, ValueEnum};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::{EstimatorKind, VehicleConfig};

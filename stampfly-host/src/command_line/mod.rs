@@ -1,8 +1,11 @@
-//! The program `stampfly`: flies the flight stack on a PC.
+//! The command line of the program `stampfly`: one file for each of its commands.
+//!
+//! It is part of the library, so that the code of every vehicle's flight is compiled once, and not
+//! again for the program.
 
 /// `println!` that does not panic when the reader has gone.
 macro_rules! outln {
-    ($($text:tt)*) => { crate::terminal::print(&format!("{}\n", format_args!($($text)*))) };
+    ($($text:tt)*) => { crate::command_line::terminal::print(&format!("{}\n", format_args!($($text)*))) };
 }
 
 mod arguments;
@@ -30,7 +33,8 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 
-fn main() -> ExitCode {
+/// Does what the command line of this process asks for. A wrong one ends the process with code 2.
+pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
         Command::Demo(options) => demo::run(&options),

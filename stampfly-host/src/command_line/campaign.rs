@@ -1,16 +1,16 @@
 //! `stampfly campaign`: many flights. Exit code 1 when one of them did not land disarmed, or when the estimator's
 //! consistency was asked for and is outside its bars.
 
-use crate::arguments::CampaignOptions;
-use crate::failure::Failure;
-use crate::fault_campaign;
-use crate::fly::add_findings;
-use crate::terminal;
+use crate::campaign::parallel::workers;
+use crate::campaign::{self, Flight, spreads};
+use crate::command_line::arguments::CampaignOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::fault_campaign;
+use crate::command_line::fly::add_findings;
+use crate::command_line::terminal;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::{Map, Value, json};
 use stampfly_board::simulation::StampFly;
-use stampfly_host::campaign::parallel::workers;
-use stampfly_host::campaign::{self, Flight, spreads};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
 use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 use std::collections::BTreeMap;

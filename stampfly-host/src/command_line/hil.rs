@@ -1,16 +1,16 @@
 //! `stampfly hil`: the flight of `stampfly fly`, flown by a vehicle at the other end of a line.
 
-use crate::arguments::HilOptions;
-use crate::doctor::port_of;
-use crate::failure::Failure;
-use crate::fly::{self, figures, fly_and_write, print_screen};
+use crate::command_line::arguments::HilOptions;
+use crate::command_line::doctor::port_of;
+use crate::command_line::failure::Failure;
+use crate::command_line::fly::{self, figures, fly_and_write, print_screen};
+use crate::hil::emulated::{Pipe, start};
+use crate::hil::program::Program;
+use crate::hil::{self, Conversation, quantile};
+use crate::vehicles::{self, ForVehicle};
 use serde_json::{Value, json};
 use stampfly_board::schedule::Runnables;
 use stampfly_bus::{Band, Schedule, TopicTable, Trigger};
-use stampfly_host::hil::emulated::{Pipe, start};
-use stampfly_host::hil::program::Program;
-use stampfly_host::hil::{self, Conversation, quantile};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::{Figures, Port, Remote, Settings, Vehicle, Verdict};
 use std::process::ExitCode;
 use std::time::Duration;

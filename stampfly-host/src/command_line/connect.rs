@@ -1,12 +1,12 @@
 //! `stampfly connect`: the ground station's page for a real vehicle, and at a cable MAVLink's ports.
 
-use crate::arguments::{ConnectOptions, VehiclePlace};
-use crate::doctor::port_of;
-use crate::failure::Failure;
-use stampfly_host::connect::{Bridge, PORTS, Place, RadioPlace};
-use stampfly_host::ground::{Hub, Limits, Server, VehicleCard};
-use stampfly_host::serve::{Key, OpenPorts, PortOption};
-use stampfly_host::vehicles::{self, ForVehicle};
+use crate::command_line::arguments::{ConnectOptions, VehiclePlace};
+use crate::command_line::doctor::port_of;
+use crate::command_line::failure::Failure;
+use crate::connect::{Bridge, PORTS, Place, RadioPlace};
+use crate::ground::{Hub, Limits, Server, VehicleCard};
+use crate::serve::{Key, OpenPorts, PortOption};
+use crate::vehicles::{self, ForVehicle};
 use stampfly_link::secure;
 use stampfly_sim::vehicle::{Transport, Vehicle};
 use std::process::ExitCode;

@@ -1,10 +1,10 @@
 //! `stampfly topics`: the topic table.
 
-use crate::arguments::TopicsOptions;
-use crate::failure::Failure;
+use crate::command_line::arguments::TopicsOptions;
+use crate::command_line::failure::Failure;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::leaves;
 use std::process::ExitCode;

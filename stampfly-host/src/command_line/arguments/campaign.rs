@@ -1,8 +1,8 @@
 //! Many flights: `campaign`.
 
 use super::SceneOptions;
+use crate::campaign::shard::Shard;
 use clap::{Args, ValueEnum};
-use stampfly_host::campaign::shard::Shard;
 use std::num::NonZero;
 use std::path::PathBuf;
 

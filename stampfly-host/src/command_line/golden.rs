@@ -1,12 +1,12 @@
 //! `stampfly golden`: the golden flight, played or recorded. Exit code 0 when every bit is as recorded.
 
-use crate::arguments::GoldenOptions;
-use crate::failure::Failure;
+use crate::command_line::arguments::GoldenOptions;
+use crate::command_line::failure::Failure;
+use crate::golden::record;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_bus::TopicTable;
 use stampfly_flight::golden::{Verdict, play};
-use stampfly_host::golden::record;
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
 use std::process::ExitCode;
 

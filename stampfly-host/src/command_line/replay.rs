@@ -1,13 +1,13 @@
 //! `stampfly replay`: the flight again. Exit code 0 when it is the same, 1 when it differs or cannot be replayed.
 
-use crate::arguments::ReplayOptions;
-use crate::failure::Failure;
-use crate::log::told;
+use crate::command_line::arguments::ReplayOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::log::told;
+use crate::log::record;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_flight::compact::Samples;
 use stampfly_flight::{Replay, replay};
-use stampfly_host::log::record;
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
 use std::process::ExitCode;

@@ -1,13 +1,13 @@
 //! `stampfly log`: what is in a log, a part of it, other formats of it.
 
-use crate::arguments::LogCommand;
-use crate::failure::Failure;
+use crate::command_line::arguments::LogCommand;
+use crate::command_line::failure::Failure;
+use crate::log::{csv, cut, info::Info, mcap, record, refly};
+use crate::serve::receive;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_flight::compact::{Contents, Samples};
 use stampfly_flight::replay;
-use stampfly_host::log::{csv, cut, info::Info, mcap, record, refly};
-use stampfly_host::serve::receive;
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::flight_log::{self, FlightLog};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;

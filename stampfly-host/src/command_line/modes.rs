@@ -3,7 +3,7 @@
 //! Transitions, guards and checks are tables of `stampfly-mode`; what a mode switch and a program may do is found by asking its
 //! `decide`.
 
-use crate::failure::Failure;
+use crate::command_line::failure::Failure;
 use stampfly_mode::arming::CHECKS;
 use stampfly_mode::decision::{State, decide};
 use stampfly_mode::transitions::{Event, TABLE, is_airborne};

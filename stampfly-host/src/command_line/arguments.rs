@@ -12,8 +12,8 @@ pub use live::{ConnectOptions, DemoOptions, HilOptions, ServeOptions, VehiclePla
 pub use log::{GoldenOptions, LogCommand, ReplayOptions};
 pub use scene::{FlyOptions, SceneOptions};
 
+use crate::vehicles;
 use clap::{Args, Parser, Subcommand};
-use stampfly_host::vehicles;
 use std::path::PathBuf;
 
 /// Flies the StampFly flight stack: in simulation, again from a log, over recorded data.

@@ -1,9 +1,9 @@
 //! A vehicle in real time, and one that is not simulated: `serve`, `connect`, `hil`, `demo`.
 
 use super::{FlyOptions, SceneOptions, VehicleOption, seconds};
+use crate::connect::{Place, RadioPlace};
+use crate::serve::PortOption;
 use clap::Args;
-use stampfly_host::connect::{Place, RadioPlace};
-use stampfly_host::serve::PortOption;
 use std::error::Error;
 use std::net::SocketAddr;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `stampfly faults`: what can go wrong in a flight.
 
-use crate::arguments::TopicsOptions;
-use crate::failure::Failure;
+use crate::command_line::arguments::TopicsOptions;
+use crate::command_line::failure::Failure;
+use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::fault::{FaultKind, FaultValue};
 use stampfly_sim::vehicle::Vehicle;
 use std::process::ExitCode;

@@ -1,18 +1,18 @@
 //! `stampfly campaign --faults`: many flights in which something goes wrong. Exit code 1 when one of them failed.
 
-use crate::arguments::{CampaignOptions, Engine};
-use crate::engine::{self, Job};
-use crate::failure::Failure;
-use crate::terminal;
+use crate::campaign::case::{Case, Cases, Plan, shell_line};
+use crate::campaign::flight::fly_case;
+use crate::campaign::row::Row;
+use crate::campaign::shard::Shard;
+use crate::campaign::shrink::shrink;
+use crate::campaign::summary::Summary;
+use crate::campaign::{file, page, parallel};
+use crate::command_line::arguments::{CampaignOptions, Engine};
+use crate::command_line::engine::{self, Job};
+use crate::command_line::failure::Failure;
+use crate::command_line::terminal;
 use indicatif::ProgressBar;
 use serde_json::json;
-use stampfly_host::campaign::case::{Case, Cases, Plan, shell_line};
-use stampfly_host::campaign::flight::fly_case;
-use stampfly_host::campaign::row::Row;
-use stampfly_host::campaign::shard::Shard;
-use stampfly_host::campaign::shrink::shrink;
-use stampfly_host::campaign::summary::Summary;
-use stampfly_host::campaign::{file, page, parallel};
 use stampfly_sim::vehicle::Vehicle;
 use std::fmt::Write;
 use std::hash::{DefaultHasher, Hasher as _};

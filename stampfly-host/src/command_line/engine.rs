@@ -2,10 +2,10 @@
 //!
 //! A task of either runs `stampfly campaign ... --shard I/N`. Results are files in a folder that all machines share.
 
-use crate::failure::Failure;
+use crate::campaign::case::shell_line;
+use crate::campaign::shard::Shard;
+use crate::command_line::failure::Failure;
 use serde_json::json;
-use stampfly_host::campaign::case::shell_line;
-use stampfly_host::campaign::shard::Shard;
 use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

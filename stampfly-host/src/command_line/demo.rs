@@ -1,8 +1,8 @@
 //! `stampfly demo`: the page that has a vehicle and its world inside.
 
-use crate::arguments::DemoOptions;
-use crate::failure::Failure;
-use stampfly_host::ground::demo;
+use crate::command_line::arguments::DemoOptions;
+use crate::command_line::failure::Failure;
+use crate::ground::demo;
 use std::process::ExitCode;
 
 pub fn run(options: &DemoOptions) -> Result<ExitCode, Failure> {

@@ -3,16 +3,16 @@
 //! Each vehicle has a thread, its ports and its log. Ctrl-C ends them, a report of each is written, and the exit code says whether
 //! a vehicle did what it must not.
 
-use crate::arguments::ServeOptions;
-use crate::failure::Failure;
-use crate::fly::{figures, write_report};
+use crate::command_line::arguments::ServeOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::fly::{figures, write_report};
+use crate::flown::{Flown, fly};
+use crate::ground::{Client, Hub, Limits, Server, VehicleCard, Watch};
+use crate::log_file::LogFile;
+use crate::recorder::Recorder;
+use crate::serve::{Key, OpenPorts, Page, PortOption, RecordOut};
+use crate::vehicles::{self, ForVehicle};
 use serde_json::Value;
-use stampfly_host::flown::{Flown, fly};
-use stampfly_host::ground::{Client, Hub, Limits, Server, VehicleCard, Watch};
-use stampfly_host::log_file::LogFile;
-use stampfly_host::recorder::Recorder;
-use stampfly_host::serve::{Key, OpenPorts, Page, PortOption, RecordOut};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_sim::vehicle::{Live, Options, Speed, Transport, Vehicle, Verdict};
 use stampfly_types::Duration;
 use std::net::{Ipv6Addr, SocketAddr};

@@ -1,17 +1,17 @@
 //! `stampfly fly`: one flight, its log and its report, and one screen about it.
 
-use crate::arguments::FlyOptions;
-use crate::failure::Failure;
-use crate::terminal;
+use crate::campaign;
+use crate::campaign::row::Row;
+use crate::command_line::arguments::FlyOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::terminal;
+use crate::flown::{Flown, fly};
+use crate::log::refly;
+use crate::recorder::{Recorder, Timing};
+use crate::report::{Metric, Report};
+use crate::vehicles::{self, ForVehicle};
 use serde_json::{Map, Value, json};
 use stampfly_bus::Schedule;
-use stampfly_host::campaign;
-use stampfly_host::campaign::row::Row;
-use stampfly_host::flown::{Flown, fly};
-use stampfly_host::log::refly;
-use stampfly_host::recorder::{Recorder, Timing};
-use stampfly_host::report::{Metric, Report};
-use stampfly_host::vehicles::{self, ForVehicle};
 use stampfly_lab::flight_log;
 use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
 use std::path::Path;

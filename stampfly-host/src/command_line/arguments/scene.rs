@@ -1,7 +1,7 @@
 //! What decides a simulated flight: `fly`, and what others take from it.
 
 use super::VehicleOption;
-use crate::failure::Failure;
+use crate::command_line::failure::Failure;
 use clap::Args;
 use stampfly_sim::vehicle::{Live, Options, Vehicle};
 use std::path::PathBuf;
