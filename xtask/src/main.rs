@@ -31,13 +31,13 @@ use step::{Chosen, Step};
 const STEPS: &[Step] = &[
     // For every push.
     Step::ci("machine", "List the missing programs that the steps need", steps::machine::run),
-    Step::ci("program", "Build the program `stampfly` that other steps run", steps::program::run).holding(&[Release]),
     Step::ci("fmt", "Check the formatting", steps::fmt::run),
-    Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
+    Step::ci("program", "Build the programs of `cargo test`, which other steps run", steps::program::run)
+        .holding(&[Debug]),
     Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
         .after(&["program"]),
     Step::ci("test", "Run `cargo test`, on recorded data as well", steps::test::run)
-        .holding(&[Debug])
+        .after(&["program"])
         .accepting(&[Rest]),
     Step::ci("ground", "Fly from the ground station's page in a real browser", steps::ground::run)
         .after(&["program"])
@@ -45,11 +45,16 @@ const STEPS: &[Step] = &[
     Step::ci("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
         .after(&["program"])
         .accepting(&[Rest]),
+    Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
     Step::ci("esp32", "Type-check the ESP32-S3 firmware, link it for the ESP32-C6", steps::esp32::run)
         .holding(&[Esp32]),
-    Step::ci("panic-proof", "Link the flight code without a panic handler", steps::panic_proof::run),
-    Step::ci("features", "Check each library with each of its features alone", steps::features::run),
-    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).accepting(&[Debian]),
+    Step::ci("panic-proof", "Link the flight code for an ARM core without a panic handler", steps::panic_proof::run),
+    Step::ci("features", "Check each library with each of its features alone", steps::features::run)
+        .holding(&[Debug])
+        .after(&["clippy"]),
+    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run)
+        .holding(&[Debug])
+        .accepting(&[Debian]),
     Step::ci("golden", "Compare the golden flight with a new recording", steps::golden::run)
         .after(&["program"])
         .accepting(&[Fix]),
@@ -69,6 +74,7 @@ const STEPS: &[Step] = &[
     // Every night.
     Step::nightly("thorough", "Run the tests that fly with all of their seeds", steps::test::thorough)
         .holding(&[Debug]),
+    Step::nightly("alone", "Check the examples and the benchmarks by themselves", steps::clippy::alone).holding(&[Debug]),
     Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .accepting(&[Fix, Rest]),
     Step::nightly("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)
@@ -85,7 +91,7 @@ const STEPS: &[Step] = &[
     Step::nightly("cache", "Count what a pass of the flight band would fetch from flash", steps::cache::run)
         .holding(&[Qemu])
         .accepting(&[Fix]),
-    Step::nightly("esp32-wifi", "Link the firmware with the feature `wifi` for the ESP32-C6", steps::esp32::wifi)
+    Step::nightly("esp32-images", "Link the firmware as it is flashed, make images of it", steps::esp32::images)
         .holding(&[Esp32]),
     Step::nightly("foreign", "Run the ESP32-C6 firmware on an emulator that is not ours", steps::foreign::run)
         .holding(&[Esp32]),
@@ -96,6 +102,7 @@ const STEPS: &[Step] = &[
     )
     .holding(&[Esp32])
     .accepting(&[Fix, File]),
+    Step::nightly("panic-proofs", "The panic proof for other cores, and for size", steps::panic_proof::others),
     Step::nightly(
         "panic-calls",
         "Find calls that panic in the firmware's (or FILE's) flight code",
@@ -120,7 +127,7 @@ const STEPS: &[Step] = &[
     Step::nightly("semver", "Compare each library's interface with the last release's", steps::semver::run),
     Step::nightly("book", "Build the book, check its links, run its tutorial's commands", steps::book::run),
     Step::nightly("determinism", "Compare the bits of optimised and unoptimised flights", steps::determinism::run)
-        .holding(&[Debug, Release]),
+        .holding(&[Release]),
     Step::nightly("shards", "Fly a campaign on a HyperQueue server that loses a worker", steps::shards::run),
     Step::nightly("vectors", "Compare the datagrams that other programs are tested against", steps::vectors::run)
         .holding(&[Debug])

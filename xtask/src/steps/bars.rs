@@ -6,7 +6,7 @@
 //! runs of a minute: what shares a machine with others was seen to slow down by 1.7 for some seconds, without a sign of it in
 //! its own times. What a step costs, whatever the machine does, is counted by `budget`.
 
-use super::program::built;
+use super::program::released;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, json};
 use serde_json::Value;
@@ -25,7 +25,7 @@ const TIMED: &str = "8";
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    let program = built(repository)?.display().to_string();
+    let program = released(repository)?.display().to_string();
     let mut failures = Vec::new();
     for (mission, arguments) in CAMPAIGNS {
         let title = [&[mission], arguments].concat().join(" ");

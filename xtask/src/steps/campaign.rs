@@ -8,11 +8,12 @@
 //! No invariant may be violated. Some flights are known to end wrong; each has its row in `docs/safety.md`. Flights are the same
 //! on every machine, so the rows are exact.
 
-use super::program::stampfly;
+use super::program::{built, released};
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, json};
 use serde_json::Value;
 use std::fs;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Has a row for each flight that is known to end wrong, which begins with the fault. It only becomes shorter.
@@ -33,15 +34,15 @@ const SOME: Size = Size { flights: 200, all: false, longest: f64::INFINITY };
 const ALL: Size = Size { flights: 2_000, all: true, longest: 240.0 };
 
 pub fn some(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    fly(repository, &SOME, "faults")
+    fly(repository, &built(repository)?, &SOME, "faults")
 }
 
 pub fn all(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    fly(repository, &ALL, "campaign")
+    fly(repository, &released(repository)?, &ALL, "campaign")
 }
 
-fn fly(repository: &Repository, size: &Size, folder: &str) -> Result<(), Failure> {
-    let mut campaign = stampfly(repository)?;
+fn fly(repository: &Repository, program: &Path, size: &Size, folder: &str) -> Result<(), Failure> {
+    let mut campaign = repository.command(&program.to_string_lossy());
     campaign.args(["campaign", "--faults", "--again", "--json", "--flights", &size.flights.to_string(), "--out"]);
     let report = report(campaign.arg(repository.target(folder)))?;
     let text = fs::read_to_string(repository.root.join(KNOWN)).map_err(|e| format!("{KNOWN}: {e}"))?;

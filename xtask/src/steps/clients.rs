@@ -4,7 +4,7 @@
 //! vehicle must not have done what it never may, and the log of the flight has to replay bit for bit without the program. Control: against
 //! a vehicle that is not there, every script has to fail.
 
-use super::program::built;
+use super::program::{built, example};
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::io::{BufRead, BufReader};
@@ -76,13 +76,11 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 /// What the firmware has at its ports, on this computer's sockets: only the sockets are others.
 fn the_firmwares_ports(repository: &Repository, python: &Path) -> Result<(), Failure> {
     let script = "mavlink_ports.py";
-    let example = ["-p", "stampfly-services", "--features", "mavlink", "--example", "ports"];
-    run_program(repository.cargo().args(["build", "--quiet", "--release"]).args(example))?;
     let folder = repository.target("clients");
     let key = folder.join("ports-key");
     let digits: String = (0..32).map(|byte| format!("{byte:02x}")).collect();
     std::fs::write(&key, digits).map_err(|error| format!("{}: {error}", key.display()))?;
-    let program = repository.target("release").join("examples/ports");
+    let program = example(repository, "ports")?;
     let process = Command::new(&program).arg(SECONDS).stdout(Stdio::piped()).spawn();
     let mut process = process.map_err(|error| format!("{program:?}: {error}"))?;
     let stdout = process.stdout.take().ok_or("no standard output")?;

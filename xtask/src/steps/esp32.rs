@@ -1,16 +1,18 @@
-//! `esp32`: the firmware for the StampFly's ESP32-S3, as far as it can be checked without Espressif's compiler.
+//! `esp32` and `esp32-images`: the firmware for the StampFly's ESP32-S3, as far as it can be checked without Espressif's compiler.
 //!
-//! | check | proves | does not prove |
-//! |---|---|---|
-//! | S3, types | types, features, pins and borrows of the real firmware, hardware in the loop included | machine code, linking, timing |
-//! | S3, a wrong pin | that the check above refuses one | |
-//! | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
-//! | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
-//! | C6, image; `esp32-wifi`: with the feature `wifi` | machine code, linking with the radio, an image that Espressif's tool accepts | the S3's |
-//! | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
+//! | step | check | proves | does not prove |
+//! |---|---|---|---|
+//! | `esp32` | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
+//! | | S3, types, with Wi-Fi and hardware in the loop | types, pins and borrows of the real firmware | machine code, linking, timing |
+//! | | C6, linked as fast as it can be | machine code, linking with the radio | the S3's; its size |
+//! | `esp32-images` | S3, types, with the flight record | types of the firmware that has no Wi-Fi | as above |
+//! | | S3, a wrong pin | that the check of types refuses one | |
+//! | | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
+//! | | C6, images as they are flashed, with `wifi` and without | that Espressif's tool accepts them | the S3's |
+//! | | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
 //!
-//! No stock compiler has inline assembly for Xtensa yet, so the first two present a 32-bit architecture that has it under
-//! the S3's target name; nothing it makes is ever run. The third builds the same code for another chip. Debian's compiler
+//! No stock compiler has inline assembly for Xtensa yet, so the checks of types present a 32-bit architecture that has it under
+//! the S3's target name; nothing it makes is ever run. The C6 is another chip with the same code. Debian's compiler
 //! comes with the sources of its own core library, which both need, and is installed when it is missing.
 
 use super::esp32_link::S3Scripts;
@@ -40,19 +42,27 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
     flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
+    check_types(repository, &stand_in(repository)?, "hil,wifi")?;
+    // How fast and how large it is are questions for the night: link-time optimisation alone takes as long as all the rest.
+    let profile = [("LTO", "off"), ("OPT_LEVEL", "1"), ("CODEGEN_UNITS", "16"), ("DEBUG", "false")];
+    let profile = profile.map(|(setting, value)| (format!("CARGO_PROFILE_RELEASE_{setting}"), value));
+    run_program(for_c6(repository, Variant::Wifi).envs(profile))
+}
+
+/// `esp32-images`: the firmware as it is flashed links, leaves a stack and makes an image, with Wi-Fi and without.
+pub fn images(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let target = stand_in(repository)?;
-    for features in ["hil,record", "hil,wifi"] {
-        run_program(s3(repository, &target, "-Dwarnings").args(["--bins", "--examples", "--features", features]))?;
-    }
+    check_types(repository, &target, "hil,record")?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let scripts = s3_scripts(repository)?;
     esp32_link::heap(repository, &scripts)?;
-    linked(repository, Variant::Default, &scripts)
+    linked(repository, Variant::Default, &scripts)?;
+    linked(repository, Variant::Wifi, &scripts)
 }
 
-/// `esp32-wifi`: the firmware with the feature `wifi` links, leaves a stack and makes an image.
-pub fn wifi(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    linked(repository, Variant::Wifi, &s3_scripts(repository)?)
+fn check_types(repository: &Repository, target: &Path, features: &str) -> Result<(), Failure> {
+    run_program(s3(repository, target, "-Dwarnings").args(["--bins", "--examples", "--features", features]))
 }
 
 fn linked(repository: &Repository, variant: Variant, scripts: &S3Scripts) -> Result<(), Failure> {
@@ -171,6 +181,19 @@ impl Variant {
 /// Builds for the ESP32-C6 and returns the program.
 pub fn c6(repository: &Repository, variant: Variant) -> Result<PathBuf, Failure> {
     provide(repository, &[&COMPILER, &LINKER])?;
+    run_program(&mut for_c6(repository, variant))?;
+    let built = repository.target("esp32").join(C6).join("release/stampfly-esp32s3");
+    if variant == Variant::Default {
+        return Ok(built);
+    }
+    // The next build of another variant takes its place.
+    let kept = built.with_file_name("stampfly-esp32s3-wifi");
+    fs::copy(&built, &kept).map_err(|e| format!("{}: {e}", kept.display()))?;
+    Ok(kept)
+}
+
+/// A cargo that builds for the ESP32-C6.
+fn for_c6(repository: &Repository, variant: Variant) -> Command {
     let mut cargo = firmware(repository, "build");
     // Not in the package's folder: its settings of cargo are the S3's, and the C6's layer of hardware refuses that of the data cache.
     cargo.current_dir(&repository.root).arg("--manifest-path").arg(repository.root.join(PACKAGE).join("Cargo.toml"));
@@ -180,15 +203,7 @@ pub fn c6(repository: &Repository, variant: Variant) -> Result<PathBuf, Failure>
     // One example is enough to see that they link.
     cargo.args(["--bins", "--example", "bmi270"]);
     cargo.args(["--release", "--no-default-features", "--features", variant.features(), "--target", C6]);
-    run_program(&mut cargo)?;
-    let built = repository.target("esp32").join(C6).join("release/stampfly-esp32s3");
-    if variant == Variant::Default {
-        return Ok(built);
-    }
-    // The next build of another variant takes its place.
-    let kept = built.with_file_name("stampfly-esp32s3-wifi");
-    fs::copy(&built, &kept).map_err(|e| format!("{}: {e}", kept.display()))?;
-    Ok(kept)
+    cargo
 }
 
 /// Makes a flash image with Espressif's own tool and says how large it is.

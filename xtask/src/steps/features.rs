@@ -20,7 +20,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         check(repository, library, &["--all-features"])?;
     }
     for tested in TESTED {
-        run_program(in_the_folder(repository, "test").arg("--quiet").args(tested))?;
+        run_program(repository.cargo().args(["test", "--quiet"]).args(tested))?;
     }
     Ok(())
 }
@@ -33,13 +33,8 @@ const TESTED: [&[&str]; 2] = [
 ];
 
 fn check(repository: &Repository, library: &Library, arguments: &[&str]) -> Result<(), Failure> {
-    run_program(in_the_folder(repository, "check").args(["--quiet", "-p", &library.name]).args(arguments))
-}
-
-/// A cargo with a build folder of its own: what is built with other features is built anew each time.
-fn in_the_folder(repository: &Repository, command: &str) -> std::process::Command {
-    let mut cargo = repository.cargo();
-    cargo.env("CARGO_PROFILE_DEV_DEBUG", "false").env("RUSTFLAGS", "-D warnings");
-    cargo.args([command, "--target-dir"]).arg(repository.target("features"));
-    cargo
+    // By clippy, for which all dependencies outside the workspace have been checked already.
+    let mut clippy = repository.cargo();
+    clippy.args(["clippy", "--quiet", "-p", &library.name]).args(arguments);
+    run_program(clippy.args(["--", "-D", "warnings"]))
 }

@@ -2,7 +2,7 @@
 //!
 //! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
 
-use super::program::stampfly;
+use super::program::released;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture};
 use std::fmt::Write;
@@ -22,9 +22,10 @@ const CAMPAIGNS: &[(&str, &[&str])] = &[
 ];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
+    let program = released(repository)?;
     let mut text = String::new();
     for (title, arguments) in CAMPAIGNS {
-        let (table, _) = capture(stampfly(repository)?.args(*arguments))?;
+        let (table, _) = capture(repository.command(&program.to_string_lossy()).args(*arguments))?;
         let _ = write!(text, "{title}: `stampfly {}`\n\n```text\n{table}```\n\n", arguments.join(" "));
     }
     print!("{text}");

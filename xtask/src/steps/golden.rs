@@ -1,50 +1,54 @@
-//! `golden`: is the committed golden flight what this flight stack flies, and does it publish the same bits, optimised
-//! and not?
+//! `golden`: is the committed golden flight what this flight stack flies?
 //!
-//! Recorded again by `--fix`, after a change that is meant to change flights.
+//! Recorded again by `--fix`, after a change that is meant to change flights. The step
+//! [`determinism`](super::determinism) asks the same of other builds.
 
+use super::program::built;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture};
 use std::fs;
-use std::process::Command;
+use std::path::Path;
 
 const RECORD: &str = "stampfly-board/golden/flight.bin";
-const PROFILES: [&str; 2] = ["release", "dev"];
 /// A flight that grows beyond this is no longer what a repository and a flash memory should hold.
 const MOST_BYTES: usize = 150_000;
 
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-    let fix = arguments.fix;
-    let committed = repository.root.join(RECORD);
-    let folder = repository.target("golden");
-    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    for profile in PROFILES {
-        let again = folder.join(profile).with_extension("bin");
-        capture(stampfly(repository, profile).arg("--record").arg(&again))?;
-        let read = |path: &std::path::Path| fs::read(path).map_err(|e| format!("{}: {e}", path.display()));
-        let (before, now) = (read(&committed)?, read(&again)?);
-        if now.len() > MOST_BYTES {
-            return Err(format!("the golden flight has {} bytes; {MOST_BYTES} is the most", now.len()));
-        }
-        if before != now {
-            // Only the first profile may change it, or the profiles would not be compared.
-            if !fix || profile != PROFILES[0] {
-                return Err(format!(
-                    "{RECORD} is not what {profile} code records; `cargo xtask golden --fix` if flights were to change"
-                ));
-            }
-            fs::write(&committed, now).map_err(|e| format!("{RECORD}: {e}"))?;
-            println!("{RECORD}: recorded again");
-        }
-        let (report, _) = capture(&mut stampfly(repository, profile))?;
-        print!("{profile}: {report}");
+    let program = built(repository)?;
+    let now = recorded(repository, &program)?;
+    if arguments.fix && now != committed(repository)? {
+        fs::write(repository.root.join(RECORD), now).map_err(|e| format!("{RECORD}: {e}"))?;
+        println!("{RECORD}: recorded again");
     }
+    compare(repository, &program)
+}
+
+/// Whether this program flies the committed flight and publishes its bits.
+pub fn compare(repository: &Repository, program: &Path) -> Result<(), Failure> {
+    if recorded(repository, program)? != committed(repository)? {
+        return Err(format!(
+            "{RECORD} is not what {} records; `cargo xtask golden --fix` if flights were to change",
+            program.display()
+        ));
+    }
+    let (report, _) = capture(repository.command(&program.to_string_lossy()).arg("golden"))?;
+    print!("{}: {report}", program.display());
     Ok(())
 }
 
-/// `stampfly golden`.
-fn stampfly(repository: &Repository, profile: &str) -> Command {
-    let mut command = repository.cargo();
-    command.args(["run", "--quiet", "--profile", profile, "--bin", "stampfly", "--", "golden"]);
-    command
+/// The golden flight as this program flies it.
+fn recorded(repository: &Repository, program: &Path) -> Result<Vec<u8>, Failure> {
+    let folder = repository.target("golden");
+    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let file = folder.join("flight.bin");
+    capture(repository.command(&program.to_string_lossy()).args(["golden", "--record"]).arg(&file))?;
+    let record = fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+    if record.len() > MOST_BYTES {
+        return Err(format!("the golden flight has {} bytes; {MOST_BYTES} is the most", record.len()));
+    }
+    Ok(record)
+}
+
+fn committed(repository: &Repository) -> Result<Vec<u8>, Failure> {
+    fs::read(repository.root.join(RECORD)).map_err(|e| format!("{RECORD}: {e}"))
 }

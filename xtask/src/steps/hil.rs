@@ -5,7 +5,7 @@
 //! conversation, compiled for it. The hash is over everything published, the duties too. Controls: another seed must give
 //! another hash, and a vehicle that is gone must be an error.
 
-use super::program::built;
+use super::program::released;
 use super::qemu::{MACHINES, Machine, inside, toolchain};
 use crate::arguments::Arguments;
 use crate::machine::{EMULATED_OTHERS, provide};
@@ -28,7 +28,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(clippy.arg(repository.target("qemu")).args(["--", "-D", "warnings"]))?;
     let machine = MACHINES.iter().find(|machine| machine.target == TARGET).ok_or("no such machine")?;
     let vehicle = format!("{EMULATOR} {}", vehicle(repository, machine)?.display());
-    let stampfly = built(repository)?;
+    let stampfly = released(repository)?;
 
     let flown = |seed: &str, options: &[&str]| -> Result<String, Failure> {
         let mut limited = repository.command("timeout");

@@ -1,27 +1,55 @@
-//! `program`: the optimised program `stampfly`, which many other steps run.
+//! `program`: all programs of `cargo test`, among them `stampfly` and the examples, which the other steps of a push run.
 //!
-//! All of them build it by [`built`]: cargo unites the features of the packages that one command line names, so another command
-//! line builds half of the workspace again.
+//! | function | build | for |
+//! |---|---|---|
+//! | [`built`], [`example`] | as `cargo test` builds it: optimised, with checks of overflow and assertions | the steps of a push |
+//! | [`unoptimised`] | as `cargo build` builds it | a comparison of bits |
+//! | [`released`] | as `cargo run --release` builds it | steps of the night that fly far, or measure |
+//!
+//! Every step uses one of these: cargo unites the features of the packages that one command line names, so another command line
+//! builds half of the workspace again.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, run as run_program};
 use std::path::PathBuf;
 use std::process::Command;
 
+/// Builds what `cargo test` runs, and ends.
+const TESTS: [&str; 3] = ["test", "--quiet", "--no-run"];
 /// As in `cargo run --release`.
-const BUILD: [&str; 5] = ["build", "--quiet", "--release", "--bin", "stampfly"];
+const RELEASE: [&str; 5] = ["build", "--quiet", "--release", "--bin", "stampfly"];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     built(repository).map(|program| println!("{}", program.display()))
 }
 
-/// Builds the program and returns its path.
+/// Builds the program as its tests do and returns its path.
 pub fn built(repository: &Repository) -> Result<PathBuf, Failure> {
-    run_program(repository.cargo().args(BUILD))?;
+    run_program(repository.cargo().args(TESTS))?;
+    Ok(repository.target("debug/stampfly"))
+}
+
+/// Builds an example of any package as the tests do and returns its path.
+pub fn example(repository: &Repository, name: &str) -> Result<PathBuf, Failure> {
+    run_program(repository.cargo().args(TESTS))?;
+    Ok(repository.target("debug/examples").join(name))
+}
+
+/// Builds the program as its users do and returns its path.
+pub fn released(repository: &Repository) -> Result<PathBuf, Failure> {
+    run_program(repository.cargo().args(RELEASE))?;
     Ok(repository.target("release/stampfly"))
 }
 
-/// Builds the program and returns a command that runs it in the top folder.
+/// Builds the program without optimisation and returns its path.
+pub fn unoptimised(repository: &Repository) -> Result<PathBuf, Failure> {
+    // In a folder of its own: in the usual one it would take the place of the program of the tests.
+    let folder = repository.target("unoptimised");
+    run_program(repository.cargo().args(["build", "--quiet", "--bin", "stampfly", "--target-dir"]).arg(&folder))?;
+    Ok(folder.join("debug/stampfly"))
+}
+
+/// Builds the program as its tests do and returns a command that runs it in the top folder.
 pub fn stampfly(repository: &Repository) -> Result<Command, Failure> {
     Ok(repository.command(&built(repository)?.to_string_lossy()))
 }

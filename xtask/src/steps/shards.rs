@@ -5,7 +5,7 @@
 //! The rows are compared by DuckDB, which then runs every query of `docs/campaigns.md`; three flights are flown again from
 //! their rows.
 
-use super::program::built;
+use super::program::released;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, announced, capture, json, python_tool};
 use serde_json::Value;
@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_secs(300);
 const AGAIN: [&str; 3] = ["0", "4", "7"];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    built(repository)?;
+    released(repository)?;
     let folder = repository.target("shards");
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -1,6 +1,6 @@
 //! `ulog`: the tools of the formats' own authors open the log of a flight, and find in it what ours say is in it.
 
-use super::program::stampfly;
+use super::program::{example, stampfly};
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, python_tool, run as run_program};
 use std::fs;
@@ -61,8 +61,7 @@ fn mcap(repository: &Repository, log: &Path) -> Result<(), Failure> {
 /// The example's two batteries are two instances of one topic, to the authors' tools as well.
 fn two_instances(repository: &Repository) -> Result<(), Failure> {
     let log = repository.target("ulog").join("example.ulg");
-    let mut write = repository.cargo();
-    run_program(write.args(["run", "--quiet", "-p", "stampfly-log", "--example", "write_log", "--"]).arg(&log))?;
+    run_program(repository.command(&example(repository, "write_log")?.to_string_lossy()).arg(&log))?;
     let (info, _) = capture(python_tool(repository, PYULOG, "ulog_info")?.arg(&log))?;
     let batteries = info.lines().filter(|line| line.trim_start().starts_with("sensor_power (")).count();
     println!("{batteries} instances of the example's sensor_power");

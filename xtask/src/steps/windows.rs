@@ -3,7 +3,7 @@
 //! Debian's MinGW links it, Debian's Wine runs it: both are the work of others. The Windows of the
 //! workflow `ci.yml` is the real one; this step also runs where there is none.
 
-use super::program::stampfly;
+use super::program::released;
 use crate::arguments::Arguments;
 use crate::machine::{MINGW, WINE, provide};
 use crate::repository::{Failure, Repository, add_targets, capture, run as run_program};
@@ -38,7 +38,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         wine.env("WINEPREFIX", folder.join("wine")).env("WINEDEBUG", "-all");
         capture(&mut wine)
     };
-    capture(stampfly(repository)?.args(FLIGHT).arg(&linux))?;
+    capture(repository.command(&released(repository)?.to_string_lossy()).args(FLIGHT).arg(&linux))?;
     wine(&[&FLIGHT[..], &["windows"]].concat())?;
     for name in ["flight.ulg", "flight.html"] {
         let read = |folder: &Path| fs::read(folder.join(name)).map_err(|e| format!("{name}: {e}"));
