@@ -24,6 +24,8 @@ pub struct Control {
     /// The line in which it wrote that, when the control was tried last.
     pub said: Option<String>,
     pub changes: Vec<Change>,
+    /// Words after the name of the step.
+    pub arguments: Vec<String>,
     /// Environment variables for the step.
     pub environment: Vec<(String, String)>,
 }
@@ -108,6 +110,7 @@ fn control(table: &Table) -> Result<Control, Failure> {
         Ok::<_, Failure>(Change { file: text(table, "file")?, right, wrong: text(table, "wrong")? })
     };
     let changes = table.get("change").and_then(Item::as_array_of_tables).into_iter().flatten();
+    let arguments = table.get("arguments").and_then(Item::as_array).into_iter().flatten();
     let variables = table.get("environment").and_then(Item::as_table_like).into_iter().flat_map(|table| table.iter());
     Ok(Control {
         step: text(table, "step")?,
@@ -115,6 +118,7 @@ fn control(table: &Table) -> Result<Control, Failure> {
         says: text(table, "says")?,
         said: table.get("said").and_then(Item::as_str).map(str::to_owned),
         changes: changes.map(change).collect::<Result<_, _>>()?,
+        arguments: arguments.filter_map(|word| Some(word.as_str()?.to_owned())).collect(),
         environment: variables
             .map(|(key, value)| (key.to_owned(), value.as_str().unwrap_or_default().to_owned()))
             .collect(),

@@ -52,9 +52,7 @@ const STEPS: &[Step] = &[
     Step::ci("features", "Check each library with each of its features alone", steps::features::run)
         .holding(&[Debug])
         .after(&["clippy"]),
-    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run)
-        .holding(&[Debug])
-        .accepting(&[Debian]),
+    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).holding(&[Debug]).accepting(&[Debian]),
     Step::ci("golden", "Compare the golden flight with a new recording", steps::golden::run)
         .after(&["program"])
         .accepting(&[Fix]),
@@ -74,7 +72,8 @@ const STEPS: &[Step] = &[
     // Every night.
     Step::nightly("thorough", "Run the tests that fly with all of their seeds", steps::test::thorough)
         .holding(&[Debug]),
-    Step::nightly("alone", "Check the examples and the benchmarks by themselves", steps::clippy::alone).holding(&[Debug]),
+    Step::nightly("alone", "Check the examples and the benchmarks by themselves", steps::clippy::alone)
+        .holding(&[Debug]),
     Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .accepting(&[Fix, Rest]),
     Step::nightly("mutants", "Change what decides whether motors turn: some test has to fail", steps::mutants::run)
