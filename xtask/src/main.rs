@@ -29,41 +29,41 @@ use step::{Chosen, Step};
 
 /// In the order in which a lane starts them. A step that builds what others use, or that takes long, comes early.
 const STEPS: &[Step] = &[
-    // For every push.
+    // For every push. Those that build in the workspace's own folder follow one another in one job, as long as there are any.
     Step::ci("machine", "List the missing programs that the steps need", steps::machine::run),
-    Step::ci("fmt", "Check the formatting", steps::fmt::run),
     Step::ci("program", "Build the programs of `cargo test`, which other steps run", steps::program::run)
         .holding(&[Debug]),
-    Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
-        .after(&["program"]),
+    Step::ci("fmt", "Check the formatting", steps::fmt::run),
+    Step::ci("esp32", "Type-check the ESP32-S3 firmware, link it for the ESP32-C6", steps::esp32::run)
+        .holding(&[Esp32]),
+    Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
+    Step::ci("features", "Check each library with each of its features alone", steps::features::run)
+        .holding(&[Debug])
+        .after(&["clippy"]),
+    Step::ci("doc", "Build the documentation; a warning fails", steps::doc::run).holding(&[Debug]),
+    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).holding(&[Debug]).accepting(&[Debian]),
+    Step::ci("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
+        .holding(&[Debug]),
+    Step::ci("examples", "Run every example to its end", steps::examples::run).holding(&[Debug]).after(&["program"]),
     Step::ci("test", "Run `cargo test`, on recorded data as well", steps::test::run)
         .after(&["program"])
         .accepting(&[Rest]),
+    Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
+        .after(&["program"]),
     Step::ci("ground", "Fly from the ground station's page in a real browser", steps::ground::run)
         .after(&["program"])
         .accepting(&[Rest]),
     Step::ci("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
         .after(&["program"])
         .accepting(&[Rest]),
-    Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
-    Step::ci("esp32", "Type-check the ESP32-S3 firmware, link it for the ESP32-C6", steps::esp32::run)
-        .holding(&[Esp32]),
     Step::ci("panic-proof", "Link the flight code for an ARM core without a panic handler", steps::panic_proof::run),
-    Step::ci("features", "Check each library with each of its features alone", steps::features::run)
-        .holding(&[Debug])
-        .after(&["clippy"]),
-    Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).holding(&[Debug]).accepting(&[Debian]),
     Step::ci("golden", "Compare the golden flight with a new recording", steps::golden::run)
         .after(&["program"])
         .accepting(&[Fix]),
     Step::ci("faults", "Fly two hundred flights with faults", steps::campaign::some).after(&["program"]),
-    Step::ci("doc", "Build the documentation; a warning fails", steps::doc::run).holding(&[Debug]),
     Step::ci("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .after(&["program"])
         .accepting(&[Fix]),
-    Step::ci("examples", "Run every example to its end", steps::examples::run).holding(&[Debug]).after(&["test"]),
-    Step::ci("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
-        .holding(&[Debug]),
     Step::ci("ulog", "Read a flight log, or FILE, with the format's own tools", steps::ulog::run)
         .after(&["program"])
         .accepting(&[File]),

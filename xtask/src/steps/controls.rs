@@ -82,7 +82,10 @@ fn tried(repository: &Repository, clone: &Path, control: &Control) -> Result<Str
 /// Runs the step in the clone. Returns whether it passed and everything it wrote.
 fn said(repository: &Repository, clone: &Path, control: &Control) -> Result<(bool, String), Failure> {
     let mut xtask = repository.cargo();
-    xtask.current_dir(clone).args(["run", "--quiet", "--package", "xtask", "--", &control.step]).args(&control.arguments);
+    xtask
+        .current_dir(clone)
+        .args(["run", "--quiet", "--package", "xtask", "--", &control.step])
+        .args(&control.arguments);
     xtask.env("CARGO_TARGET_DIR", repository.target(FOLDER).join("target")).env("CARGO_INCREMENTAL", "0");
     // The clone has no recorded flights next to it.
     if let Some(data) = repository.data() {

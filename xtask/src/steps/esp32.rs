@@ -33,6 +33,13 @@ const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
 /// Espressif's tool; its output is parsed here.
 const ESPTOOL: &str = "esptool==5.6.0";
+/// For a push: how fast and how large the firmware is are questions for the night. Both chips have the same, so that macros and
+/// build scripts are built once.
+const QUICK: [(&str, &str); 3] = [
+    ("CARGO_PROFILE_RELEASE_LTO", "off"),
+    ("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16"),
+    ("CARGO_PROFILE_RELEASE_DEBUG", "false"),
+];
 /// No S3 has this pin; `src/pins.rs` asks for it when told to.
 const WRONG_PIN: &str = "GPIO22";
 
@@ -42,18 +49,16 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
     flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
-    check_types(repository, &stand_in(repository)?, "hil,wifi")?;
-    // How fast and how large it is are questions for the night: link-time optimisation alone takes as long as all the rest.
-    let profile = [("LTO", "off"), ("OPT_LEVEL", "1"), ("CODEGEN_UNITS", "16"), ("DEBUG", "false")];
-    let profile = profile.map(|(setting, value)| (format!("CARGO_PROFILE_RELEASE_{setting}"), value));
-    run_program(for_c6(repository, Variant::Wifi).envs(profile))
+    run_program(types(repository, &stand_in(repository)?, "hil,wifi").envs(QUICK))?;
+    // What is not optimised at all does not fit into memory.
+    run_program(for_c6(repository, Variant::Wifi).envs(QUICK).env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1"))
 }
 
 /// `esp32-images`: the firmware as it is flashed links, leaves a stack and makes an image, with Wi-Fi and without.
 pub fn images(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let target = stand_in(repository)?;
-    check_types(repository, &target, "hil,record")?;
+    run_program(&mut types(repository, &target, "hil,record"))?;
     refuses_a_wrong_pin(s3(repository, &target, "--cfg__CLIPPY_HACKERY__wrong_pin"))?;
     let scripts = s3_scripts(repository)?;
     esp32_link::heap(repository, &scripts)?;
@@ -61,8 +66,11 @@ pub fn images(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     linked(repository, Variant::Wifi, &scripts)
 }
 
-fn check_types(repository: &Repository, target: &Path, features: &str) -> Result<(), Failure> {
-    run_program(s3(repository, target, "-Dwarnings").args(["--bins", "--examples", "--features", features]))
+/// A check of the S3's types with these features.
+fn types(repository: &Repository, target: &Path, features: &str) -> Command {
+    let mut cargo = s3(repository, target, "-Dwarnings");
+    cargo.args(["--bins", "--examples", "--features", features]);
+    cargo
 }
 
 fn linked(repository: &Repository, variant: Variant, scripts: &S3Scripts) -> Result<(), Failure> {
