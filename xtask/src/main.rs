@@ -45,12 +45,12 @@ const STEPS: &[Step] = &[
     Step::ci("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
         .holding(&[Debug]),
     Step::ci("examples", "Run every example to its end", steps::examples::run).holding(&[Debug]).after(&["program"]),
-    Step::ci("test", "Run `cargo test`, on recorded data as well", steps::test::run)
-        .after(&["program"])
-        .accepting(&[Rest]),
     Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
         .after(&["program"]),
     Step::ci("ground", "Fly from the ground station's page in a real browser", steps::ground::run)
+        .after(&["program"])
+        .accepting(&[Rest]),
+    Step::ci("test", "Run `cargo test`, on recorded data as well", steps::test::run)
         .after(&["program"])
         .accepting(&[Rest]),
     Step::ci("demo", "Make the page with a vehicle inside, and fly it in a real browser", steps::demo::run)
