@@ -29,7 +29,8 @@ use step::{Chosen, Step};
 
 /// In the order in which a lane starts them. A step that builds what others use, or that takes long, comes early.
 const STEPS: &[Step] = &[
-    // For every push. Those that build in the workspace's own folder follow one another in one job, as long as there are any.
+    // For every push. Steps that build in the workspace's own folder come first: one job runs them one
+    // after the other, the other job runs the rest.
     Step::ci("machine", "List the missing programs that the steps need", steps::machine::run),
     Step::ci("program", "Build the programs of `cargo test`, which other steps run", steps::program::run)
         .holding(&[Debug]),

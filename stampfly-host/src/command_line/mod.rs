@@ -33,7 +33,8 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 
-/// Does what the command line of this process asks for. A wrong one ends the process with code 2.
+/// Parses the arguments of this process and runs the command they name. Wrong arguments end the
+/// process with code 2.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {

@@ -1,14 +1,15 @@
 //! `clippy` and `alone`: no warning in any target, tests, examples and benchmarks included.
 //!
-//! | step | what |
+//! | step | packages |
 //! |---|---|
 //! | `clippy` | the workspace |
-//! | `alone` | packages that are built by themselves: examples and benchmarks with no feature but those they ask for, and three that are no members of the workspace |
+//! | `alone` | examples and benchmarks, each with its own features only; three outside the workspace |
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, add_targets, run as run_program};
 
-/// What `cargo test` builds, with the features it has there, so that build scripts and macros are built once; then what it leaves out.
+/// First the packages of `cargo test`, with the same features, so that build scripts and macros are
+/// built once for both; then the one that it leaves out.
 const PACKAGES: [&[&str]; 2] = [&[], &["-p", "xtask"]];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
@@ -20,7 +21,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a member of the workspace has that people build by itself.
+/// Members of the workspace, and their targets that users build with `-p`.
 const MEMBERS: [(&str, &str); 2] = [("stampfly-benches", "--benches"), ("examples", "--examples")];
 /// Packages that are no members: folder, options, folder of the build.
 const OTHERS: [(&str, &[&str], &str); 3] = [
@@ -29,7 +30,7 @@ const OTHERS: [(&str, &[&str], &str); 3] = [
     ("stampfly-board/panic-proof", &["--release"], "panic-proof"),
 ];
 
-/// `alone`: what is built by itself.
+/// `alone`: packages with no features but their own.
 pub fn alone(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     for (package, targets) in MEMBERS {
         run_program(repository.cargo().args(["check", "--quiet", "-p", package, targets]))?;

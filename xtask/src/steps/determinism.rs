@@ -1,6 +1,7 @@
 //! `determinism`: the same flight, optimised and not, publishes the same bits.
 //!
-//! Compares the hash over everything published that `stampfly fly --seed N --json` prints, and the committed golden flight.
+//! Two builds fly the committed golden flight and two seeds; `stampfly fly --seed N --json` prints a
+//! hash over all messages of a flight.
 
 use super::golden;
 use super::program::{released, unoptimised};

@@ -1,19 +1,22 @@
-//! `esp32` and `esp32-images`: the firmware for the StampFly's ESP32-S3, as far as it can be checked without Espressif's compiler.
+//! `esp32` and `esp32-images`: checks of the firmware for the StampFly's ESP32-S3 that need no
+//! compiler of Espressif's.
 //!
-//! | step | check | proves | does not prove |
+//! | step | check | shows | does not show |
 //! |---|---|---|---|
-//! | `esp32` | S3, runner | that the documented way of flashing makes the chip read its flash as fast as it can | that it does |
-//! | | S3, types, with Wi-Fi and hardware in the loop | types, pins and borrows of the real firmware | machine code, linking, timing |
-//! | | C6, linked as fast as it can be | machine code, linking with the radio | the S3's; its size |
-//! | `esp32-images` | S3, types, with the flight record | types of the firmware that has no Wi-Fi | as above |
-//! | | S3, a wrong pin | that the check of types refuses one | |
-//! | | S3, linker scripts ([`esp32_link`](super::esp32_link)) | that the heap beside the data cache is there | the rest of the program |
-//! | | C6, images as they are flashed, with `wifi` and without | that Espressif's tool accepts them | the S3's |
-//! | | S3, memory ([`s3_memory`](super::s3_memory)) | that the S3's first core is left a stack | to the byte: code differs |
+//! | `esp32` | S3, runner | espflash sets the fastest reading of the flash | that the chip does it |
+//! | | S3, types: Wi-Fi, HIL | types, pins, borrows | machine code, linking, timing |
+//! | | C6, linked, little optimised | machine code, linking with the radio | the S3's code; size |
+//! | `esp32-images` | S3, types: flight record | types without Wi-Fi | as above |
+//! | | S3, a wrong pin | the check of types refuses one | |
+//! | | S3, linker scripts | its second heap has room | the rest of the program |
+//! | | C6, images to flash | Espressif's tool accepts them | the S3's code |
+//! | | S3, memory | its first core has a stack left | the exact size: code differs |
 //!
-//! No stock compiler has inline assembly for Xtensa yet, so the checks of types present a 32-bit architecture that has it under
-//! the S3's target name; nothing it makes is ever run. The C6 is another chip with the same code. Debian's compiler
-//! comes with the sources of its own core library, which both need, and is installed when it is missing.
+//! No stock compiler has inline assembly for Xtensa. The checks of types therefore use a 32-bit
+//! architecture that has it, under the name of the S3's target; its output is never run. The C6 runs
+//! the same code on another chip. Both need the sources of the core library, which come with Debian's
+//! compiler; the steps install it. [`esp32_link`](super::esp32_link) has the linker scripts,
+//! [`s3_memory`](super::s3_memory) the memory.
 
 use super::esp32_link::S3Scripts;
 use super::no_std::debian_cargo;
@@ -33,7 +36,7 @@ const S3: &str = "xtensa-esp32s3-none-elf.json";
 const C6: &str = "riscv32imac-unknown-none-elf";
 /// Espressif's tool; its output is parsed here.
 const ESPTOOL: &str = "esptool==5.6.0";
-/// For a push: how fast and how large the firmware is are questions for the night. Both chips have the same, so that macros and
+/// Profile of a push, which asks for neither speed nor size. Both chips have it, so that macros and
 /// build scripts are built once.
 const QUICK: [(&str, &str); 3] = [
     ("CARGO_PROFILE_RELEASE_LTO", "off"),
@@ -50,11 +53,11 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let config = repository.root.join(PACKAGE).join(".cargo/config.toml");
     flashes_fast(&fs::read_to_string(&config).map_err(|e| format!("{}: {e}", config.display()))?)?;
     run_program(types(repository, &stand_in(repository)?, "hil,wifi").envs(QUICK))?;
-    // What is not optimised at all does not fit into memory.
+    // Without any optimisation the code exceeds the C6's RAM.
     run_program(for_c6(repository, Variant::Wifi).envs(QUICK).env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1"))
 }
 
-/// `esp32-images`: the firmware as it is flashed links, leaves a stack and makes an image, with Wi-Fi and without.
+/// `esp32-images`: the firmware with the flashed profile, with Wi-Fi and without.
 pub fn images(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     provide(repository, &[&COMPILER, &CLIPPY, &LINKER])?;
     let target = stand_in(repository)?;

@@ -1,7 +1,8 @@
 //! `examples`: every example of the examples package, and of every driver over its emulated chip, still runs to its end.
 
+use super::program::example;
 use crate::arguments::Arguments;
-use crate::repository::{Failure, Repository, capture, run as run_program};
+use crate::repository::{Failure, Repository, capture};
 use std::fs;
 
 /// A driver's example for this PC.
@@ -17,11 +18,8 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let emulated = libraries.iter().filter(|library| repository.root.join(&library.folder).join(EMULATED).exists());
     names.extend(emulated.map(|library| library.name.replace("stampfly-", "emulated-")));
     names.sort();
-    // All of the workspace's at once, as `cargo test` has built them: for one package alone, features and with them all
-    // dependencies would be others.
-    run_program(repository.cargo().args(["build", "--quiet", "--profile", "test", "--examples"]))?;
     for name in &names {
-        let program = repository.target("debug/examples").join(name);
+        let program = example(repository, name)?;
         let (printed, _) = capture(&mut repository.command(&program.to_string_lossy()))?;
         if printed.is_empty() {
             return Err(format!("the example `{name}` shows nothing"));

@@ -1,11 +1,11 @@
-//! `features` and `each-feature`: a library compiles without its features, with each of them alone and with all of them.
+//! `features` and `each-feature`: each library compiles by itself with each choice of its features.
 //!
-//! Inside the workspace every crate is built with the features that the others ask for, and those that no crate asks for are not
-//! built at all. Here a crate is checked by itself.
+//! In a build of the workspace, a library has the features that other crates depend on and no
+//! others. These steps check it alone.
 //!
 //! | step | features |
 //! |---|---|
-//! | `features` | none; all; what a feature adds that has a test of its own is tested |
+//! | `features` | none, all; also runs the tests that a feature adds |
 //! | `each-feature` | one at a time |
 
 use crate::arguments::Arguments;
@@ -22,7 +22,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `each-feature`: those that are one of several.
+/// `each-feature`: with its only feature, `features` has checked a library already.
 pub fn each(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     for library in with_features(repository)?.iter().filter(|library| library.features.len() > 1) {
         for feature in &library.features {
@@ -49,7 +49,7 @@ const TESTED: [&[&str]; 2] = [
 ];
 
 fn check(repository: &Repository, library: &Library, arguments: &[&str]) -> Result<(), Failure> {
-    // By clippy, for which all dependencies outside the workspace have been checked already.
+    // Clippy, because the step `clippy` has checked all dependencies outside the workspace.
     let mut clippy = repository.cargo();
     clippy.args(["clippy", "--quiet", "-p", &library.name]).args(arguments);
     run_program(clippy.args(["--", "-D", "warnings"]))

@@ -1,6 +1,6 @@
 //! `fuzz`: every fuzz target over its corpus and seeded mutations of it, on the stable compiler.
 //!
-//! It is the same each time; [`search`](super::search) looks for inputs that nobody has thought of.
+//! Each run has the same inputs; the step [`search`](super::search) looks for new ones.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, run as run_program};

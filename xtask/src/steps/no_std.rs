@@ -1,6 +1,7 @@
-//! `no-std`: every library but the simulator compiles for bare metal, ARM with and RISC-V without an FPU.
+//! `no-std`: every library but the simulator compiles for bare metal, for ARM with an FPU and RISC-V
+//! without one.
 //!
-//! It is checked and not built: other steps link what is made of these libraries, for these cores.
+//! The step checks and builds nothing: `panic-proof` and `esp32` link these libraries for these cores.
 //!
 //! The targets come from rustup. Where rustup cannot deliver them, Debian's compiler builds the core library from its
 //! own sources instead; it is installed when it is missing.

@@ -1,13 +1,14 @@
-//! `program`: all programs of `cargo test`, among them `stampfly` and the examples, which the other steps of a push run.
+//! `program`: builds what `cargo test` runs. The other steps of a push run the program `stampfly` and
+//! the examples of this build.
 //!
-//! | function | build | for |
+//! | function | build | used by |
 //! |---|---|---|
-//! | [`built`], [`example`] | as `cargo test` builds it: optimised, with checks of overflow and assertions | the steps of a push |
-//! | [`unoptimised`] | as `cargo build` builds it | a comparison of bits |
-//! | [`released`] | as `cargo run --release` builds it | steps of the night that fly far, or measure |
+//! | [`built`], [`example`] | `cargo test`: optimised, with assertions | steps of a push |
+//! | [`unoptimised`] | `cargo build` | a comparison of bits |
+//! | [`released`] | `cargo run --release` | long campaigns, measurements |
 //!
-//! Every step uses one of these: cargo unites the features of the packages that one command line names, so another command line
-//! builds half of the workspace again.
+//! A step builds by one of these functions only. Cargo unites the features of the packages that a
+//! command line names, so another command line builds half of the workspace again.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, run as run_program};
@@ -31,8 +32,8 @@ pub fn built(repository: &Repository) -> Result<PathBuf, Failure> {
 
 /// Builds an example of any package as the tests do and returns its path.
 pub fn example(repository: &Repository, name: &str) -> Result<PathBuf, Failure> {
-    run_program(repository.cargo().args(TESTS))?;
-    Ok(repository.target("debug/examples").join(name))
+    let program = built(repository)?;
+    Ok(program.with_file_name("examples").join(name))
 }
 
 /// Builds the program as its users do and returns its path.
