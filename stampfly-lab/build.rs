@@ -2,21 +2,24 @@
 //! the reason, where they are not.
 
 use std::env;
+use std::path::{Path, absolute};
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(recorded_data)");
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=STAMPFLY_DATA");
-    // A build script runs in the folder of its package; the data lie beside the workspace.
-    let folder = env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../../shared/data".to_owned());
+    let package = env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
+    // Relative to the repository, as `cargo xtask` reads it, too.
+    let workspace = Path::new(&package).parent().unwrap_or(Path::new(".."));
+    let folder = workspace.join(env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../shared/data".to_owned()));
     // The canonical path begins with `\\?\` on Windows; a `/` in what is joined to it is then no
     // separator.
-    match std::path::absolute(&folder) {
+    match absolute(&folder) {
         Ok(folder) if folder.is_dir() => {
             println!("cargo::rerun-if-changed={}", folder.display());
             println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={}", folder.display());
             println!("cargo::rustc-cfg=recorded_data");
         }
-        _ => println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={folder}"),
+        _ => println!("cargo::rustc-env=STAMPFLY_DATA_FOLDER={}", folder.display()),
     }
 }

@@ -21,10 +21,10 @@ pub fn thorough(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(test(repository)?.env("STAMPFLY_THOROUGH", "1").args(["--test", "host"]))
 }
 
-/// `cargo test`, which is told where the recorded flights are.
+/// `cargo test`, once the recorded flights are there. It finds them itself, as at home: an environment of
+/// its own would build again what other steps use at that moment.
 fn test(repository: &Repository) -> Result<Command, Failure> {
-    let data = repository.data();
-    match &data {
+    match repository.data() {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),
         None if in_ci() && !without_recorded_flights() => {
             return Err("CI=true and no recorded data: set STAMPFLY_DATA to its folder".to_owned());
@@ -34,8 +34,5 @@ fn test(repository: &Repository) -> Result<Command, Failure> {
     let mut test = repository.cargo();
     // A test that fails hides no other one.
     test.args(["test", "--no-fail-fast"]);
-    if let Some(folder) = data {
-        test.env("STAMPFLY_DATA", folder);
-    }
     Ok(test)
 }
