@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::compact_record`].
+//! libFuzzer's entry to [`fuzz_checks::compact_record`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::compact_record(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::compact_record(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::console_line`].
+//! libFuzzer's entry to [`fuzz_checks::console_line`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::console_line(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::console_line(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::data_stream`].
+//! libFuzzer's entry to [`fuzz_checks::data_stream`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::data_stream(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::data_stream(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::estimator_stream`].
+//! libFuzzer's entry to [`fuzz_checks::estimator_stream`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::estimator_stream(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::estimator_stream(data));

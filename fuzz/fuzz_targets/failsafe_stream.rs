@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::failsafe_stream`].
+//! libFuzzer's entry to [`fuzz_checks::failsafe_stream`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::failsafe_stream(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::failsafe_stream(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::ground_ask`].
+//! libFuzzer's entry to [`fuzz_checks::ground_ask`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::ground_ask(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::ground_ask(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::ground_http`].
+//! libFuzzer's entry to [`fuzz_checks::ground_http`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::ground_http(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::ground_http(data));

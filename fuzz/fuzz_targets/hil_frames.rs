@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::hil_frames`].
+//! libFuzzer's entry to [`fuzz_checks::hil_frames`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::hil_frames(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::hil_frames(data));

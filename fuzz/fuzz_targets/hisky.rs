@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::hisky`].
+//! libFuzzer's entry to [`fuzz_checks::hisky`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::hisky(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::hisky(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::mode_machine`].
+//! libFuzzer's entry to [`fuzz_checks::mode_machine`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::mode_machine(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::mode_machine(data));

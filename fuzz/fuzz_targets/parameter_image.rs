@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::parameter_image`].
+//! libFuzzer's entry to [`fuzz_checks::parameter_image`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::parameter_image(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::parameter_image(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::radio_packets`].
+//! libFuzzer's entry to [`fuzz_checks::radio_packets`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::radio_packets(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::radio_packets(data));

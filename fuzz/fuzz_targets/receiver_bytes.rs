@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::receiver_bytes`].
+//! libFuzzer's entry to [`fuzz_checks::receiver_bytes`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::receiver_bytes(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::receiver_bytes(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::rover_datagrams`].
+//! libFuzzer's entry to [`fuzz_checks::rover_datagrams`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::rover_datagrams(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::rover_datagrams(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::secure_session`].
+//! libFuzzer's entry to [`fuzz_checks::secure_session`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::secure_session(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::secure_session(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::services_mavlink`].
+//! libFuzzer's entry to [`fuzz_checks::services_mavlink`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::services_mavlink(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::services_mavlink(data));

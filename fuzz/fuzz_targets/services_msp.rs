@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::services_msp`].
+//! libFuzzer's entry to [`fuzz_checks::services_msp`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::services_msp(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::services_msp(data));

@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::services_tello`].
+//! libFuzzer's entry to [`fuzz_checks::services_tello`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::services_tello(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::services_tello(data));

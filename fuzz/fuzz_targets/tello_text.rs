@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::tello_text`].
+//! libFuzzer's entry to [`fuzz_checks::tello_text`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::tello_text(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::tello_text(data));

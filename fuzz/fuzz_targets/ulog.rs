@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::ulog`].
+//! libFuzzer's entry to [`fuzz_checks::ulog`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::ulog(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::ulog(data));

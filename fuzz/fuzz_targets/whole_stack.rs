@@ -1,4 +1,4 @@
-//! libFuzzer's entry to [`stampfly_fuzz::whole_stack`].
+//! libFuzzer's entry to [`fuzz_checks::whole_stack`].
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| stampfly_fuzz::whole_stack(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz_checks::whole_stack(data));

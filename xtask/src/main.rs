@@ -43,8 +43,6 @@ const STEPS: &[Step] = &[
         .after(&["clippy"]),
     Step::ci("doc", "Build the documentation; a warning fails", steps::doc::run).holding(&[Debug]),
     Step::ci("no-std", "Check the libraries for bare metal", steps::no_std::run).holding(&[Debug]).accepting(&[Debian]),
-    Step::ci("fuzz", "Run the fuzz targets over their corpora and seeded mutations", steps::fuzz::run)
-        .holding(&[Debug]),
     Step::ci("examples", "Run every example to its end", steps::examples::run).holding(&[Debug]).after(&["program"]),
     Step::ci("clients", "Let programs that others have written fly a simulated vehicle", steps::clients::run)
         .after(&["program"]),

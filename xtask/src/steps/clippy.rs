@@ -3,7 +3,7 @@
 //! | step | packages |
 //! |---|---|
 //! | `clippy` | the workspace |
-//! | `alone` | examples and benchmarks, each with its own features only; three outside the workspace |
+//! | `alone` | examples and benchmarks, each with its own features only; two outside the workspace |
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, add_targets, run as run_program};
@@ -24,8 +24,7 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
 /// Members of the workspace, and their targets that users build with `-p`.
 const MEMBERS: [(&str, &str); 2] = [("stampfly-benches", "--benches"), ("examples", "--examples")];
 /// Packages that are no members: folder, options, folder of the build.
-const OTHERS: [(&str, &[&str], &str); 3] = [
-    ("fuzz", &["--lib", "--tests"], ""),
+const OTHERS: [(&str, &[&str], &str); 2] = [
     ("stampfly-board/browser", &["--release", "--target", "wasm32-unknown-unknown"], "browser"),
     ("stampfly-board/panic-proof", &["--release"], "panic-proof"),
 ];

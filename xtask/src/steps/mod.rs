@@ -23,7 +23,6 @@ pub mod features;
 pub mod figures;
 pub mod fmt;
 pub mod foreign;
-pub mod fuzz;
 pub mod golden;
 pub mod ground;
 pub mod hals;

@@ -3,9 +3,9 @@
 //! It needs no nightly compiler: libFuzzer's counters are a pass of LLVM, and the sanitizer's library comes with the stable compiler, which only has
 //! to be told that unstable options are meant. The options are cargo-fuzz's, but for its single codegen unit a crate, which takes longer
 //! to build. It needs a C++ compiler. Inputs that are found go to `target/search/corpus`, where the next search begins with them, their number is added to
-//! `target/search/executions`, and those that fail go to `fuzz/artifacts`: a failure is kept as a file of `fuzz/corpus`, which [`fuzz`](super::fuzz) replays ever after.
+//! `target/search/executions`, and those that fail go to `fuzz/artifacts`: a failure is kept as a file of
+//! `fuzz/corpus`, with which `cargo test` calls its target ever after.
 
-use super::fuzz::PACKAGE;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture, in_ci, run as run_program};
 use std::fs;
@@ -14,6 +14,8 @@ use std::process::Output;
 use std::sync::Mutex;
 use std::thread;
 
+/// The package of cargo-fuzz.
+const PACKAGE: &str = "fuzz";
 /// How long a target is searched with unless a time is given.
 const SECONDS: u64 = 20;
 /// Shortest and longest limit of an input's length, bytes.

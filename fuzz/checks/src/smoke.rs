@@ -72,7 +72,7 @@ fn mutate(data: &mut Vec<u8>, other: &[u8], random: &mut impl Rng) {
 
 /// The files of a target's corpus, by name.
 fn corpus(name: &str) -> Vec<(String, Vec<u8>)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../corpus").join(name);
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut files: Vec<_> = entries
         .map(|entry| {

@@ -1,8 +1,8 @@
 //! Fuzz targets: what reads bytes from outside must survive any bytes, and what flies any sequence of inputs.
 //!
-//! Each target is a plain function that panics when something is wrong. libFuzzer calls it (`fuzz_targets/`), and so does a
-//! test on the stable compiler (`cargo xtask fuzz`), with every file of the target's corpus and some thousands of
-//! mutations of them.
+//! Each target is a plain function that panics when something is wrong. libFuzzer calls it
+//! (`fuzz/fuzz_targets`), and so does a test of this crate, with every file of the target's corpus
+//! (`fuzz/corpus`) and some thousands of mutations of them.
 //!
 //! | target | bytes from | checked besides panics |
 //! |---|---|---|

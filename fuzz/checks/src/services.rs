@@ -3,7 +3,7 @@
 //! Messages are mostly framed soundly here, because a checksum stops nearly all bytes that are drawn, and what is behind it would not be reached.
 
 #[allow(dead_code, reason = "the tests use the rest")]
-#[path = "../../stampfly-services/tests/services/common.rs"]
+#[path = "../../../stampfly-services/tests/services/common.rs"]
 mod common;
 
 use crate::Input;
