@@ -38,7 +38,7 @@ const STEPS: &[Step] = &[
     Step::ci("esp32", "Type-check the ESP32-S3 firmware, link it for the ESP32-C6", steps::esp32::run)
         .holding(&[Esp32]),
     Step::ci("clippy", "Lint every target; a warning fails", steps::clippy::run).holding(&[Debug]),
-    Step::ci("features", "Check each library without its features and with all of them", steps::features::run)
+    Step::ci("features", "Check each library without any of its features", steps::features::run)
         .holding(&[Debug])
         .after(&["clippy"]),
     Step::ci("doc", "Build the documentation; a warning fails", steps::doc::run).holding(&[Debug]),
@@ -72,7 +72,7 @@ const STEPS: &[Step] = &[
     Step::nightly("thorough", "Run the tests that fly with all of their seeds", steps::test::thorough)
         .holding(&[Debug]),
     Step::nightly("alone", "Lint packages that are built by themselves", steps::clippy::alone).holding(&[Debug]),
-    Step::nightly("each-feature", "Check each library with each of its features alone", steps::features::each)
+    Step::nightly("each-feature", "Check each library with each feature alone, and with all", steps::features::each)
         .holding(&[Debug]),
     Step::nightly("bugs", "Re-insert field bugs into a copy: the flight that finds each", steps::bugs::run)
         .accepting(&[Fix, Rest]),

@@ -5,8 +5,10 @@
 //!
 //! | step | features |
 //! |---|---|
-//! | `features` | none, all; also runs the tests that a feature adds |
-//! | `each-feature` | one at a time |
+//! | `features` | none |
+//! | `each-feature` | one at a time, all |
+//!
+//! The step `doc` compiles all libraries with all features, together.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Library, Repository, run as run_program};
@@ -14,19 +16,19 @@ use crate::repository::{Failure, Library, Repository, run as run_program};
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     for library in with_features(repository)? {
         check(repository, &library, &["--no-default-features"])?;
-        check(repository, &library, &["--all-features"])?;
-    }
-    for tested in TESTED {
-        run_program(repository.cargo().args(["test", "--quiet"]).args(tested))?;
     }
     Ok(())
 }
 
-/// `each-feature`: with its only feature, `features` has checked a library already.
+/// `each-feature`.
 pub fn each(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
-    for library in with_features(repository)?.iter().filter(|library| library.features.len() > 1) {
+    for library in with_features(repository)? {
         for feature in &library.features {
-            check(repository, library, &["--no-default-features", "--features", feature])?;
+            check(repository, &library, &["--no-default-features", "--features", feature])?;
+        }
+        // Its only feature has been checked.
+        if library.features.len() > 1 {
+            check(repository, &library, &["--all-features"])?;
         }
     }
     Ok(())
@@ -40,13 +42,6 @@ fn with_features(repository: &Repository) -> Result<Vec<Library>, Failure> {
     }
     Ok(libraries)
 }
-
-/// What a feature adds that does something by itself.
-const TESTED: [&[&str]; 2] = [
-    // A clock that can be asked on this PC, too.
-    &["-p", "stampfly-driver-core", "--features", "embassy-time", "--test", "driver-core", "embassy"],
-    &["-p", "stampfly-bus", "--features", "async", "bell"],
-];
 
 fn check(repository: &Repository, library: &Library, arguments: &[&str]) -> Result<(), Failure> {
     // Clippy, because the step `clippy` has checked all dependencies outside the workspace.
