@@ -10,6 +10,9 @@ use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::thread;
+use std::time::Instant;
 
 const FOLDER: &str = "examples/clients";
 const PACKAGES: [&str; 4] = ["pymavlink==2.4.50", "djitellopy==2.5.0", "mavsdk==4.1.0", "yamspy==0.3.3"];
@@ -18,16 +21,23 @@ const SECONDS: &str = "120";
 /// djitellopy cannot be told to take any port that is free: these are asked for first.
 const FREE: usize = 3;
 
+/// Scripts that run at the same time: they mostly wait for a vehicle that flies in real time.
+const AT_ONCE: usize = 3;
+
 /// A script, its arguments with the names of ports in braces, and options of `serve`. With `--vehicle` first it is another vehicle.
-const SCRIPTS: [(&str, &[&str], &[&str]); 15] = [
+type Script = (&'static str, &'static [&'static str], &'static [&'static str]);
+/// The longest first.
+const SCRIPTS: [Script; 15] = [
+    // Two flights of five minutes each, and no fix in the first one.
+    ("mavlink_plane.py", &["tcp:{mavlink-tcp}"], &["--vehicle", "plane", "--speed", "10", "--fault", "gnss-lost@0+60"]),
+    ("mavsdk_mission.py", &["udpin://{mavlink-udp}"], &[]),
+    ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"], &[]),
     ("mavlink_square.py", &["tcp:{mavlink-tcp}"], &[]),
     ("mavlink_square.py", &["udpin:{mavlink-udp}"], &[]),
     ("mavlink_square.py", &["{usb}"], &[]),
-    ("mavsdk_mission.py", &["udpin://{mavlink-udp}"], &[]),
     ("mavlink_calibrate.py", &["tcp:{mavlink-tcp}"], &[]),
     ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all", "--port", "sealed=0"]),
     ("yamspy_tune.py", &["{msp-serial}"], &[]),
-    ("tello_square.py", &["{tello}", "{free}", "{tello-state#}"], &[]),
     ("read_streams.py", &["{telemetry#}", "{stream}"], &[]),
     ("console.py", &["{console}"], &[]),
     ("yamspy_quad.py", &["{msp-serial}"], &["--vehicle", "stm32-quad"]),
@@ -38,8 +48,6 @@ const SCRIPTS: [(&str, &[&str], &[&str]); 15] = [
         &["tcp:{mavlink-tcp}", "{key}", "roll.p"],
         &["--vehicle", "stm32-quad", "--key", "{key}", "--sign-all"],
     ),
-    // Two flights of five minutes each, and no fix in the first one.
-    ("mavlink_plane.py", &["tcp:{mavlink-tcp}"], &["--vehicle", "plane", "--speed", "10", "--fault", "gnss-lost@0+60"]),
 ];
 /// Ports that are asked for at any number, those that every vehicle has first, and then that of all but the aircraft.
 const PORTS: [&str; 7] = ["http", "mavlink-tcp", "msp", "tello", "stream", "console", "usb-tcp"];
@@ -53,24 +61,52 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let python = environment(repository)?;
     let program = built(repository)?;
     refuses_strangers(&program)?;
-    for (place, (script, arguments, options)) in SCRIPTS.iter().enumerate() {
-        let out = repository.target("clients").join(place.to_string());
-        _ = std::fs::remove_dir_all(&out);
-        let mut vehicle = Vehicle::start(&program, &out, options)?;
-        let said = script_with(repository, &python, script, arguments, &vehicle)?;
-        print!("{script}\n{}", indented(&said));
-        vehicle.end()?;
-        for log in logs(&out)? {
-            let (replayed, _) = capture(Command::new(&program).arg("replay").arg(log))?;
-            if !replayed.contains("identical") {
-                return Err(format!("{script}: the flight does not replay:\n{replayed}"));
+    let waiting = Mutex::new(SCRIPTS.iter().enumerate());
+    let next = || waiting.lock().ok().and_then(|mut waiting| waiting.next());
+    let fly_some = || {
+        let mut failures = Vec::new();
+        while let Some((place, script)) = next() {
+            let begun = Instant::now();
+            match flown(repository, &python, &program, place, script) {
+                // Whole, because another script says something at the same time.
+                Ok(said) => print!("{}, {:.0} s\n{}", script.0, begun.elapsed().as_secs_f64(), indented(&said)),
+                Err(failure) => failures.push(format!("{}: {failure}", script.0)),
             }
         }
-        if script_with(repository, &python, script, arguments, &vehicle).is_ok() {
-            return Err(format!("{script} succeeds without a vehicle"));
+        failures
+    };
+    let mut failures: Vec<Failure> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..AT_ONCE).map(|_| scope.spawn(fly_some)).collect();
+        let panicked = |_| vec!["a thread panicked".to_owned()];
+        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(panicked)).collect()
+    });
+    failures.extend(the_firmwares_ports(repository, &python).err());
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n")) }
+}
+
+/// Runs a script against a vehicle of its own, replays the logs, and runs it without the vehicle. Returns what it said.
+fn flown(
+    repository: &Repository,
+    python: &Path,
+    program: &Path,
+    place: usize,
+    (script, arguments, options): &Script,
+) -> Result<String, Failure> {
+    let out = repository.target("clients").join(place.to_string());
+    _ = std::fs::remove_dir_all(&out);
+    let mut vehicle = Vehicle::start(program, &out, options)?;
+    let said = script_with(repository, python, script, arguments, &vehicle)?;
+    vehicle.end()?;
+    for log in logs(&out)? {
+        let (replayed, _) = capture(Command::new(program).arg("replay").arg(log))?;
+        if !replayed.contains("identical") {
+            return Err(format!("the flight does not replay:\n{replayed}"));
         }
     }
-    the_firmwares_ports(repository, &python)
+    match script_with(repository, python, script, arguments, &vehicle) {
+        Ok(_) => Err("the script succeeds without a vehicle".to_owned()),
+        Err(_) => Ok(said),
+    }
 }
 
 /// What the firmware has at its ports, on this computer's sockets: only the sockets are others.
