@@ -107,6 +107,3 @@ impl<'d> Input<'d> {
         self.0.is_empty()
     }
 }
-
-#[cfg(test)]
-mod smoke;

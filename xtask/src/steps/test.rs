@@ -15,10 +15,10 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     run_program(repository.cargo().args(["test", "--quiet", "-p", "xtask"]))
 }
 
-/// `thorough`: the tests that fly, with all of their seeds.
+/// `thorough`: the tests that fly, with all of their seeds, and the fuzz targets with more mutations.
 pub fn thorough(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     // By the name of the program and not of its package, whose features alone would build everything again.
-    run_program(test(repository)?.env("STAMPFLY_THOROUGH", "1").args(["--test", "host"]))
+    run_program(test(repository)?.env("STAMPFLY_THOROUGH", "1").args(["--test", "host", "--test", "corpora"]))
 }
 
 /// `cargo test`, once the recorded flights are there. It finds them itself, as at home: an environment of
