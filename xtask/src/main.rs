@@ -15,6 +15,7 @@ mod lane;
 mod machine;
 mod mutation;
 mod page;
+mod parallel;
 mod ratchet;
 mod reinserted;
 mod repository;

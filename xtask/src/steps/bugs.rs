@@ -6,13 +6,11 @@
 //! that restrict it to these bugs.
 
 use crate::arguments::Arguments;
+use crate::parallel;
 use crate::reinserted::flight::{Copy, copy};
 use crate::reinserted::list::{Bug, FILE, List};
 use crate::reinserted::{page, tree};
 use crate::repository::{Failure, Repository};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 use std::time::Instant;
 
 /// As many have to be found.
@@ -29,7 +27,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     println!("the copy with {} bugs was built in {:.0} s", list.bugs.len(), begun.elapsed().as_secs_f64());
     let flown: Vec<Bug> = list.bugs.iter().filter(|bug| chosen(bug)).cloned().collect();
     let recorded: Vec<&Bug> = flown.iter().filter(|bug| bug.flight.is_some()).collect();
-    let verdicts = side_by_side(&recorded, &|bug| shown(repository, &copy, bug));
+    let verdicts = parallel::each(&recorded, parallel::cores(), |bug| shown(repository, &copy, bug));
     println!("{:<40} {:<16} {:<16} flight", "bug", "ends with it", "without it");
     let mut failures = Vec::new();
     for (bug, verdict) in recorded.iter().zip(&verdicts) {
@@ -114,27 +112,6 @@ fn fix(
     Ok(failures)
 }
 
-/// Does something with every bug, on all cores; the answers in the order of the bugs.
-fn side_by_side<T: Send>(bugs: &[&Bug], work: &(dyn Fn(&Bug) -> T + Sync)) -> Vec<T> {
-    let (next, answers) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    let workers = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                loop {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(bug) = bugs.get(place) else { break };
-                    let answer = work(bug);
-                    answers.lock().unwrap_or_else(|e| e.into_inner()).push((place, answer));
-                }
-            });
-        }
-    });
-    let mut answers = answers.into_inner().unwrap_or_else(|e| e.into_inner());
-    answers.sort_by_key(|(place, _)| *place);
-    answers.into_iter().map(|(_, answer)| answer).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,12 +127,5 @@ mod tests {
         assert!(ends(Some("I10"), None).is_err_and(|e| e.contains("--fix")));
         assert!(ends(Some("crashed"), Some("I10")).is_err_and(|e| e.contains("without it")));
         assert!(judged(&bug, &Err("no program".into())).is_err());
-    }
-
-    #[test]
-    fn answers_come_in_the_order_of_the_bugs() {
-        let bugs: Vec<Bug> = (0..9).map(|k| Bug { name: k.to_string(), ..Bug::default() }).collect();
-        let answers = side_by_side(&bugs.iter().collect::<Vec<_>>(), &|bug| bug.name.clone());
-        assert_eq!(answers.join(""), "012345678");
     }
 }

@@ -6,12 +6,11 @@
 
 use super::program::{built, example};
 use crate::arguments::Arguments;
+use crate::parallel;
 use crate::repository::{Failure, Repository, capture, run as run_program};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Mutex;
-use std::thread;
 use std::time::Instant;
 
 const FOLDER: &str = "examples/clients";
@@ -61,25 +60,14 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let python = environment(repository)?;
     let program = built(repository)?;
     refuses_strangers(&program)?;
-    let waiting = Mutex::new(SCRIPTS.iter().enumerate());
-    let next = || waiting.lock().ok().and_then(|mut waiting| waiting.next());
-    let fly_some = || {
-        let mut failures = Vec::new();
-        while let Some((place, script)) = next() {
-            let begun = Instant::now();
-            match flown(repository, &python, &program, place, script) {
-                // Whole, because another script says something at the same time.
-                Ok(said) => print!("{}, {:.0} s\n{}", script.0, begun.elapsed().as_secs_f64(), indented(&said)),
-                Err(failure) => failures.push(format!("{}: {failure}", script.0)),
-            }
-        }
-        failures
-    };
-    let mut failures: Vec<Failure> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..AT_ONCE).map(|_| scope.spawn(fly_some)).collect();
-        let panicked = |_| vec!["a thread panicked".to_owned()];
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(panicked)).collect()
+    let outcomes = parallel::each(SCRIPTS.iter().enumerate(), AT_ONCE, |(place, script)| {
+        let begun = Instant::now();
+        let said = flown(repository, &python, &program, place, script).map_err(|e| format!("{}: {e}", script.0))?;
+        // In one call, because another script prints at the same time.
+        print!("{}, {:.0} s\n{}", script.0, begun.elapsed().as_secs_f64(), indented(&said));
+        Ok(())
     });
+    let mut failures: Vec<Failure> = outcomes.into_iter().filter_map(Result::err).collect();
     failures.extend(the_firmwares_ports(repository, &python).err());
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n")) }
 }

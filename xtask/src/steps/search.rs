@@ -7,12 +7,11 @@
 //! `fuzz/corpus`, with which `cargo test` calls its target ever after.
 
 use crate::arguments::Arguments;
+use crate::parallel;
 use crate::repository::{Failure, Repository, capture, in_ci, run as run_program};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
-use std::sync::Mutex;
-use std::thread;
 
 /// The package of cargo-fuzz.
 const PACKAGE: &str = "fuzz";
@@ -35,33 +34,24 @@ const FLAGS: &[&str] = &[
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let seconds = arguments.seconds.unwrap_or(SECONDS);
     let programs = build(repository)?;
-    let waiting = Mutex::new(targets(repository)?);
-    let next = || waiting.lock().ok().and_then(|mut targets| targets.pop());
-    let search_all = || -> Result<(u64, Vec<String>), Failure> {
-        let (mut total, mut failed) = (0, Vec::new());
-        while let Some(target) = next() {
-            let output = search(repository, &programs.join(&target), &target, seconds)?;
-            let said = String::from_utf8_lossy(&output.stderr);
-            let executions = executions(&said);
-            total += executions;
-            println!("{target:<18} {executions:>12} executions");
-            // A search that did nothing found nothing either.
-            if !output.status.success() || executions == 0 {
-                eprintln!("{said}");
-                failed.push(target);
-            }
+    // Two at a time.
+    let outcomes = parallel::each(targets(repository)?, 2, |target| -> Result<_, Failure> {
+        let output = search(repository, &programs.join(&target), &target, seconds)?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        let executions = executions(&said);
+        println!("{target:<18} {executions:>12} executions");
+        // A search that did nothing found nothing either.
+        let passed = output.status.success() && executions > 0;
+        if !passed {
+            eprintln!("{said}");
         }
-        Ok((total, failed))
-    };
-    let done = thread::scope(|scope| {
-        let searches = [scope.spawn(search_all), scope.spawn(search_all)];
-        searches.map(|search| search.join().unwrap_or_else(|_| Err("a search panicked".to_owned())))
+        Ok((target, executions, passed))
     });
     let (mut total, mut failed) = (0, Vec::new());
-    for result in done {
-        let (executions, failures) = result?;
+    for outcome in outcomes {
+        let (target, executions, passed) = outcome?;
         total += executions;
-        failed.extend(failures);
+        failed.extend((!passed).then_some(target));
     }
     println!("{:<18} {total:>12} executions, {seconds} s each", "all");
     println!("{:<18} {:>12} executions", "with those before", tally(repository, total)?);
