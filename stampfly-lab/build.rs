@@ -8,10 +8,8 @@ fn main() {
     println!("cargo::rustc-check-cfg=cfg(recorded_data)");
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=STAMPFLY_DATA");
-    let package = env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
-    // Relative to the repository, as `cargo xtask` reads it, too.
-    let workspace = Path::new(&package).parent().unwrap_or(Path::new(".."));
-    let folder = workspace.join(env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../shared/data".to_owned()));
+    // Relative to the repository, as `cargo xtask` reads it; a build script runs in the folder of its package.
+    let folder = Path::new("..").join(env::var("STAMPFLY_DATA").unwrap_or_else(|_| "../shared/data".to_owned()));
     // The canonical path begins with `\\?\` on Windows; a `/` in what is joined to it is then no
     // separator.
     match absolute(&folder) {

@@ -21,8 +21,8 @@ pub fn thorough(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     run_program(test(repository)?.env("STAMPFLY_THOROUGH", "1").args(["--test", "host", "--test", "corpora"]))
 }
 
-/// `cargo test`, once the recorded flights are there. It finds them itself, as at home: an environment of
-/// its own would build again what other steps use at that moment.
+/// `cargo test`, after a look whether the recorded flights are there. The build script of the laboratory
+/// finds them: if this step set `STAMPFLY_DATA`, cargo would build again what other steps are using.
 fn test(repository: &Repository) -> Result<Command, Failure> {
     match repository.data() {
         Some(folder) => eprintln!("recorded data: {}", folder.display()),

@@ -1,5 +1,5 @@
-//! Every target over its corpus and mutations of it, on the stable compiler. Always the same ones, so a
-//! failure repeats. `STAMPFLY_THOROUGH=1` asks for ten times as many.
+//! Calls every target with the files of its corpus and with mutations of them, on the stable compiler.
+//! The mutations are the same in each run; with `STAMPFLY_THOROUGH=1` there are ten times as many.
 
 use fuzz_checks::{
     compact_record, console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames,
