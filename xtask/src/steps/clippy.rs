@@ -34,7 +34,7 @@ pub fn alone(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     for (package, targets) in MEMBERS {
         run_program(repository.cargo().args(["check", "--quiet", "-p", package, targets]))?;
     }
-    add_targets(repository, &["wasm32-unknown-unknown"])?;
+    add_targets(repository, &["wasm32-unknown-unknown", "thumbv7em-none-eabihf"])?;
     for (folder, options, place) in OTHERS {
         let mut clippy = repository.cargo();
         // Flags that are meant for the host would replace those of the package.
