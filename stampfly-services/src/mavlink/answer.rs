@@ -9,10 +9,9 @@ use stampfly_link::mavlink::dialects::common::{MavMissionType, TIMESYNC_DATA};
 use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
-/// Answers one message of a client's system. Returns where on Earth the vehicle is, if it was told.
+/// Answers one message. Returns where on Earth the vehicle is, if it was told.
 pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
     turn: Turn<'_, '_, C, ITEMS>,
-    system: u8,
     message: &Heard,
 ) -> Option<Origin> {
     let (now, own, seat) = (turn.now, turn.own, turn.seat);
@@ -60,43 +59,43 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
             let answer = TIMESYNC_DATA { tc1: (now.as_micros() as i64).saturating_mul(1000), ..sync.clone() };
             turn.client.send(&answer.into(), turn.put);
         }
-        _ => mission(turn, system, message),
+        _ => mission(turn, message),
     }
     None
 }
 
 /// The messages of the mission protocol.
-fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, system: u8, message: &Heard) {
-    let Turn { now, own, client, missions, put, .. } = turn;
+fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, message: &Heard) {
+    let Turn { now, own, asker, client, missions, put, .. } = turn;
     match message {
         Heard::MissionCount(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.count(now, client, system, request, put);
+            missions.count(now, client, asker, request, put);
         }
         Heard::MissionItemInt(item) if own.is_meant(item.target_system, item.target_component) => {
-            missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
+            missions.item(now, client, own, asker, (item.seq, item.mission_type, Some(item.into())), put);
         }
         Heard::MissionItem(item) if own.is_meant(item.target_system, item.target_component) => {
-            missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
+            missions.item(now, client, own, asker, (item.seq, item.mission_type, Some(item.into())), put);
         }
         Heard::MissionRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.list(client, system, request.mission_type, put);
+            missions.list(client, asker, request.mission_type, put);
         }
         Heard::MissionRequestInt(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.request(client, system, (request.seq, request.mission_type), put);
+            missions.request(client, asker, (request.seq, request.mission_type), put);
         }
         // Older programs ask so, and read both kinds of item.
         Heard::MissionRequest(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.request(client, system, (request.seq, request.mission_type), put);
+            missions.request(client, asker, (request.seq, request.mission_type), put);
         }
         Heard::MissionClearAll(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.clear(client, system, request.mission_type, put);
+            missions.clear(client, asker, request.mission_type, put);
         }
         Heard::MissionSetCurrent(request) if own.is_meant(request.target_system, request.target_component) => {
             missions.set_current(usize::from(request.seq));
             client.send(&missions.state(), put);
         }
         Heard::MissionAck(ack) if own.is_meant(ack.target_system, ack.target_component) => {
-            missions.acknowledged(client, ack);
+            missions.acknowledged(client, asker, ack);
         }
         _ => {}
     }
@@ -124,20 +123,16 @@ fn set_origin<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITE
 }
 
 /// What cannot be read is answered so that nobody waits for it.
-pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(
-    turn: Turn<'_, '_, C, ITEMS>,
-    system: u8,
-    message: Unreadable,
-) {
+pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, message: Unreadable) {
     let own = turn.own;
     match message {
         Unreadable::Heartbeat => sign_of_life(turn),
         Unreadable::Command { number, target: [to, component] } if own.is_meant(to, component) => {
-            commands::refuse(turn.client, number, turn.put);
+            commands::refuse(turn.client, number, turn.asker, turn.put);
         }
         Unreadable::Item { sequence, kind: 0, target: [to, component] } if own.is_meant(to, component) => {
             let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
-            turn.missions.item(turn.now, turn.client, own, system, (sequence, kind, None), turn.put);
+            turn.missions.item(turn.now, turn.client, own, turn.asker, (sequence, kind, None), turn.put);
         }
         _ => {}
     }

@@ -29,10 +29,10 @@ pub(super) struct Due {
 
 /// What a byte has ended.
 pub(super) enum Fed {
-    /// A message of this system that is for a vehicle.
-    Message(u8, Heard),
-    /// A message of this system that the dialect cannot read, but that wants an answer.
-    Unreadable(u8, Unreadable),
+    /// A message of this system and component that is for a vehicle.
+    Message([u8; 2], Heard),
+    /// A message of this system and component that the dialect cannot read, but that wants an answer.
+    Unreadable([u8; 2], Unreadable),
     /// Bytes of another protocol, of this system.
     Tunnel(u8, Tunnel),
     /// A frame that is not signed as it must be.
@@ -129,8 +129,8 @@ impl<C> Client<C> {
             return Some(Fed::Tunnel(frame.system, Tunnel::read(frame.payload)?));
         }
         Some(match Heard::read(&frame)? {
-            Ok(message) => Fed::Message(frame.system, message),
-            Err(message) => Fed::Unreadable(frame.system, message),
+            Ok(message) => Fed::Message([frame.system, frame.component], message),
+            Err(message) => Fed::Unreadable([frame.system, frame.component], message),
         })
     }
 

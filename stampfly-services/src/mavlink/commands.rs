@@ -53,6 +53,8 @@ fn whole(number: f32) -> Option<u32> {
 pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub now: Instant,
     pub own: &'t Own,
+    /// System and component that asks.
+    pub asker: [u8; 2],
     pub client: &'t mut Client<C>,
     pub missions: &'t mut Missions<C, ITEMS>,
     pub calibrating: &'t mut Calibrating<C>,
@@ -64,23 +66,35 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
 /// Does what is asked, and acknowledges it.
 pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
     let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
-        let Turn { now, client, calibrating, cockpit, put, .. } = &mut turn;
+        let Turn { now, client, asker, calibrating, cockpit, put, .. } = &mut turn;
         // What takes longer is acknowledged there.
-        let Err(result) = calibrating.ask(*now, client, &command.parameters, &mut **cockpit, &mut **put) else {
+        let Err(result) = calibrating.ask(*now, client, *asker, &command.parameters, &mut **cockpit, &mut **put) else {
             return;
         };
         result
     } else {
         turn.outcome(command)
     };
-    let ack = COMMAND_ACK_DATA { command: command.kind, result, ..Default::default() };
-    turn.client.send(&ack.into(), turn.put);
+    acknowledge(turn.client, command.kind as u16, turn.asker, (result, 0), turn.put);
 }
 
 /// Says that a command that this dialect does not have is not supported.
-pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, put: Put<'_, C>) {
+pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, asker: [u8; 2], put: Put<'_, C>) {
+    acknowledge(client, number, asker, (MavResult::MAV_RESULT_UNSUPPORTED, 0), put);
+}
+
+/// Says to who has asked what has become of the command with this number, and how far it is in per cent.
+///
+/// Written as bytes, because the dialect has not every number: the command, its result, the progress, four bytes of no meaning here, and the addressee.
+pub(super) fn acknowledge<C>(
+    client: &mut Client<C>,
+    number: u16,
+    [system, component]: [u8; 2],
+    (result, progress): (MavResult, u8),
+    put: Put<'_, C>,
+) {
     let [low, high] = number.to_le_bytes();
-    let payload = [low, high, MavResult::MAV_RESULT_UNSUPPORTED as u8, 0, 0, 0, 0, 0, 0, 0];
+    let payload = [low, high, result as u8, progress, 0, 0, 0, 0, system, component];
     client.send_payload(COMMAND_ACK_DATA::ID, &payload, put);
 }
 

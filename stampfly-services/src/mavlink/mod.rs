@@ -182,6 +182,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
 
     /// Somebody is gone.
     pub fn close(&mut self, client: C) {
+        self.missions.forget(client);
         self.clients.retain(|known| known.id != client);
     }
 
@@ -206,7 +207,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
-            let (system, said) = match client.feed(*byte, guard.as_mut()) {
+            let (asker, said) = match client.feed(*byte, guard.as_mut()) {
                 None => continue,
                 Some(Fed::Untrusted(why)) => {
                     *untrusted = untrusted.wrapping_add(1);
@@ -227,8 +228,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                     }
                     continue;
                 }
-                Some(Fed::Message(system, message)) => (system, Ok(message)),
-                Some(Fed::Unreadable(system, message)) => (system, Err(message)),
+                Some(Fed::Message(asker, message)) => (asker, Ok(message)),
+                Some(Fed::Unreadable(asker, message)) => (asker, Err(message)),
             };
             let turn = Turn {
                 now,
@@ -236,13 +237,14 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 client: &mut *client,
                 missions: &mut *missions,
                 calibrating: &mut *calibrating,
-                seat: Seat::Mavlink(system),
+                asker,
+                seat: Seat::Mavlink(asker[0]),
                 cockpit: &mut *cockpit,
                 put: &mut *put,
             };
             match said {
-                Ok(message) => own.origin = answer::message(turn, system, &message).or(own.origin),
-                Err(message) => answer::unreadable(turn, system, message),
+                Ok(message) => own.origin = answer::message(turn, &message).or(own.origin),
+                Err(message) => answer::unreadable(turn, message),
             }
         }
     }

@@ -8,6 +8,8 @@ mod desk;
 mod mavlink;
 #[cfg(feature = "mavlink")]
 mod mission;
+#[cfg(feature = "mavlink")]
+mod mission_line;
 mod msp;
 #[cfg(feature = "network")]
 mod network;
