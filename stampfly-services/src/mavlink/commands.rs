@@ -1,20 +1,20 @@
 //! Commands, and what becomes of each.
 //!
-//! A command is acknowledged when it has reached the vehicle, not when it has been carried out: arming that would be refused is
-//! denied at once, with the reasons as texts. What a program may ask for while another one commands is the
-//! [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
+//! What changes the vehicle's state is acknowledged when it [has happened](super::orders); arming that would be refused is denied at once, with the reasons as texts. What a
+//! program may ask for while another one commands is the [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
 
 use super::calibration::Calibrating;
 use super::client::{Client, Put};
 use super::identity::Own;
 use super::missions::Missions;
+use super::orders::{Asked, Deed, Orders, say, take_off};
 use super::streams::{STREAMS, make, text};
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::{Refusal, Seat};
 use core::fmt::Write;
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
-use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{ArmBlocks, FlightPhase, FlightStatus, GuidedCommand};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// A command with its parameters, however it came. Positions of `COMMAND_INT` are whole numbers of units that only a place on
@@ -58,24 +58,25 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub client: &'t mut Client<C>,
     pub missions: &'t mut Missions<C, ITEMS>,
     pub calibrating: &'t mut Calibrating<C>,
+    pub orders: &'t mut Orders<C>,
     pub seat: Seat,
     pub cockpit: &'t mut dyn Cockpit,
     pub put: Put<'p, C>,
 }
 
-/// Does what is asked, and acknowledges it.
+/// Does what is asked, and acknowledges it, now or when it has happened.
 pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
+    let number = command.kind as u16;
     let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
         let Turn { now, client, asker, calibrating, cockpit, put, .. } = &mut turn;
-        // What takes longer is acknowledged there.
-        let Err(result) = calibrating.ask(*now, client, *asker, &command.parameters, &mut **cockpit, &mut **put) else {
-            return;
-        };
-        result
+        calibrating.ask(*now, client, *asker, &command.parameters, &mut **cockpit, &mut **put).err()
     } else {
-        turn.outcome(command)
+        turn.outcome(number, command)
     };
-    acknowledge(turn.client, command.kind as u16, turn.asker, (result, 0), turn.put);
+    if let Some(result) = result {
+        let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS { u8::MAX } else { 0 };
+        acknowledge(turn.client, number, turn.asker, (result, progress), turn.put);
+    }
 }
 
 /// Says that a command that this dialect does not have is not supported.
@@ -99,41 +100,29 @@ pub(super) fn acknowledge<C>(
 }
 
 impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
-    fn outcome(&mut self, Command { kind, parameters: [p1, p2, p3, .., p7] }: &Command) -> MavResult {
-        let status = self.cockpit.view().state();
-        match kind {
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => {
-                if !status.armed && !status.blocks.is_empty() {
-                    for name in status.blocks.names() {
-                        self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), self.put);
-                    }
-                    return MavResult::MAV_RESULT_DENIED;
-                }
-                self.guide(simple(GuidedKind::Arm))
-            }
+    /// What becomes of a command. `None`: it is acknowledged when it has happened.
+    fn outcome(&mut self, number: u16, command: &Command) -> Option<MavResult> {
+        let Command { kind, parameters: [p1, p2, p3, .., p7] } = command;
+        Some(match kind {
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => return self.does(number, Deed::Arm, *p7),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
                 // 21196 says "whatever it does": motors off.
                 let force = *p2 == 21_196.0;
-                self.guide(simple(if force { GuidedKind::Kill } else { GuidedKind::Disarm }))
+                return self.does(number, if force { Deed::Kill } else { Deed::Disarm }, *p7);
             }
-            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => self.guide(simple(GuidedKind::Kill)),
-            MavCmd::MAV_CMD_NAV_TAKEOFF if !status.armed => MavResult::MAV_RESULT_DENIED,
-            MavCmd::MAV_CMD_NAV_TAKEOFF => {
-                let height = if p7.is_finite() && *p7 > 0.0 { *p7 } else { self.own.identity.take_off_height };
-                let position = Vec3::new(0.0, 0.0, -height);
-                self.guide(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() })
-            }
-            MavCmd::MAV_CMD_NAV_LAND => self.guide(simple(GuidedKind::Land)),
-            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => self.guide(simple(GuidedKind::Hold)),
-            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => self.come_back(),
-            MavCmd::MAV_CMD_DO_SET_MODE => self.set_mode(*p1, *p2, *p3),
+            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => return self.does(number, Deed::Kill, *p7),
+            MavCmd::MAV_CMD_NAV_TAKEOFF => return self.does(number, Deed::TakeOff, *p7),
+            MavCmd::MAV_CMD_NAV_LAND => return self.does(number, Deed::Land, *p7),
+            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => return self.does(number, Deed::Hold, *p7),
+            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => return self.does(number, Deed::Return, *p7),
+            MavCmd::MAV_CMD_DO_SET_MODE => return self.set_mode(number, [*p1, *p2, *p3]),
             MavCmd::MAV_CMD_MISSION_START => match whole(*p1) {
                 Some(0) => self.start_mission(),
                 // Another first item than the first.
                 Some(place) if self.missions.set_current(place as usize) => self.start_mission(),
                 _ => MavResult::MAV_RESULT_DENIED,
             },
-            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => self.guide(simple(GuidedKind::Hold)),
+            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => return self.does(number, Deed::Hold, *p7),
             MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 1.0 => self.start_mission(),
             MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => {
                 match whole(*p1).is_some_and(|place| self.missions.set_current(place as usize)) {
@@ -155,44 +144,88 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                 })
             }
             _ => MavResult::MAV_RESULT_UNSUPPORTED,
-        }
+        })
     }
 
-    /// Asks the vehicle for something. Whatever else was asked of it, a mission included, is over then.
-    fn guide(&mut self, command: GuidedCommand) -> MavResult {
-        let asked = self.cockpit.guide(self.now, self.seat, command);
-        match command.kind {
-            _ if asked.is_err() => {}
-            GuidedKind::Arm => self.missions.runner.arms(self.now),
+    /// Asks the vehicle for something that changes its state. `None`: it is acknowledged when that has happened. A take-off has a height, m.
+    fn does(&mut self, number: u16, deed: Deed, height: f32) -> Option<MavResult> {
+        let status = self.cockpit.view().state();
+        let asked = Asked { client: self.client.id, asker: self.asker, number, deed };
+        if self.orders.has(&asked) {
+            if deed.ends_a_flight() {
+                // Twice is once, and the first may have been lost on a radio.
+                _ = self.ask_for(deed, height);
+            }
+            return Some(MavResult::MAV_RESULT_IN_PROGRESS);
+        }
+        if self.orders.is_full() && !deed.ends_a_flight() {
+            return Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        }
+        let height = if height.is_finite() && height > 0.0 { height } else { self.own.identity.take_off_height };
+        if deed == Deed::TakeOff && !status.armed && self.orders.is_arming() {
+            // Sent together with the command to arm: it waits for that.
+            self.orders.wait(self.now, asked, self.seat, Some(height), self.cockpit);
+            return None;
+        }
+        if deed == Deed::Arm && self.is_blocked(&status) {
+            return Some(MavResult::MAV_RESULT_DENIED);
+        }
+        if let Some(why) = deed.refusal(&status) {
+            say(self.client, deed, "denied", &why, self.put);
+            return Some(MavResult::MAV_RESULT_DENIED);
+        }
+        if let Err(refusal) = self.ask_for(deed, height) {
+            say(self.client, deed, "denied", &refusal, self.put);
+            return Some(result(Err(refusal)));
+        }
+        let has_happened = deed.has_happened(&status);
+        let waits = !has_happened && self.orders.wait(self.now, asked, self.seat, None, self.cockpit);
+        (!waits).then_some(MavResult::MAV_RESULT_ACCEPTED)
+    }
+
+    /// Would arming be refused? Then every reason is said. That nobody is heard is none, for a command is.
+    fn is_blocked(&mut self, status: &FlightStatus) -> bool {
+        let blocks = status.blocks.without(ArmBlocks::NO_LINK);
+        if status.armed || blocks.is_empty() {
+            return false;
+        }
+        for name in blocks.names() {
+            self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), self.put);
+        }
+        true
+    }
+
+    /// Asks the vehicle. Whatever else was asked of it, a mission included, is over then.
+    fn ask_for(&mut self, deed: Deed, height: f32) -> Result<(), Refusal> {
+        match deed {
+            Deed::TakeOff => self.cockpit.guide(self.now, self.seat, take_off(height))?,
+            Deed::Return => {
+                let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
+                let home = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..deed.command() };
+                self.cockpit.fly_to(self.now, self.seat, home)?;
+            }
+            _ => self.cockpit.guide(self.now, self.seat, deed.command())?,
+        }
+        match deed {
+            Deed::Arm => self.missions.runner.arms(self.now),
             _ => _ = self.missions.runner.halt(),
         }
-        result(asked)
+        Ok(())
     }
 
     fn request(&mut self, request: Request) -> MavResult {
         result(self.cockpit.request(self.now, request))
     }
 
-    fn come_back(&mut self) -> MavResult {
-        if self.cockpit.view().state().phase != FlightPhase::Flying {
-            return MavResult::MAV_RESULT_UNSUPPORTED;
-        }
-        let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
-        let place = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..Default::default() };
-        let asked = self.cockpit.fly_to(self.now, self.seat, place);
-        if asked.is_ok() {
-            self.missions.runner.halt();
-        }
-        result(asked)
-    }
-
     fn start_mission(&mut self) -> MavResult {
         if self.missions.is_empty() {
+            self.not_started(&"there is none");
             return MavResult::MAV_RESULT_DENIED;
         }
         // Takes the lease, or says who has it.
         let asked = self.cockpit.guide(self.now, self.seat, GuidedCommand::default());
-        if asked.is_err() {
+        if let Err(refusal) = asked {
+            self.not_started(&refusal);
             return result(asked);
         }
         match self.missions.runner.start(self.now, self.seat, self.cockpit) {
@@ -201,29 +234,34 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                 MavResult::MAV_RESULT_ACCEPTED
             }
             Err(why) => {
-                let mut words = heapless::String::<50>::new();
-                _ = write!(words, "{why}");
-                self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "mission not started: ", &words), self.put);
+                self.not_started(&why);
                 MavResult::MAV_RESULT_DENIED
             }
         }
     }
 
+    fn not_started(&mut self, why: &dyn core::fmt::Display) {
+        let mut words = heapless::String::<50>::new();
+        // What does not fit is cut off.
+        _ = write!(words, "{why}");
+        self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "mission not started: ", &words), self.put);
+    }
+
     /// Modes have numbers of their own in every autopilot. Understood are MAVLink's own flags, "auto" for a mission and "guided" for staying in place, and
     /// the numbers of PX4 (main mode 4, "auto"), which programs send to whatever is not ArduPilot.
-    fn set_mode(&mut self, flags: f32, main: f32, sub: f32) -> MavResult {
+    fn set_mode(&mut self, number: u16, [flags, main, sub]: [f32; 3]) -> Option<MavResult> {
         let flags = whole(flags).and_then(|flags| u8::try_from(flags).ok()).map(MavModeFlag::from_bits_truncate);
-        let Some(flags) = flags else { return MavResult::MAV_RESULT_DENIED };
+        let Some(flags) = flags else { return Some(MavResult::MAV_RESULT_DENIED) };
         let custom = flags.contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED);
         match (whole(main), whole(sub)) {
-            (Some(4), Some(3)) if custom => self.guide(simple(GuidedKind::Hold)),
-            (Some(4), Some(4)) if custom => self.start_mission(),
-            (Some(4), Some(5)) if custom => self.come_back(),
-            (Some(4), Some(6)) if custom => self.guide(simple(GuidedKind::Land)),
-            _ if custom => MavResult::MAV_RESULT_UNSUPPORTED,
-            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => self.start_mission(),
-            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.guide(simple(GuidedKind::Hold)),
-            _ => MavResult::MAV_RESULT_UNSUPPORTED,
+            (Some(4), Some(3)) if custom => self.does(number, Deed::Guided, 0.0),
+            (Some(4), Some(4)) if custom => Some(self.start_mission()),
+            (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
+            (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
+            _ if custom => Some(MavResult::MAV_RESULT_UNSUPPORTED),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.does(number, Deed::Guided, 0.0),
+            _ => Some(MavResult::MAV_RESULT_UNSUPPORTED),
         }
     }
 
@@ -237,10 +275,6 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         self.client.send(&message, self.put);
         MavResult::MAV_RESULT_ACCEPTED
     }
-}
-
-fn simple(kind: GuidedKind) -> GuidedCommand {
-    GuidedCommand { kind, ..Default::default() }
 }
 
 fn result(asked: Result<(), Refusal>) -> MavResult {

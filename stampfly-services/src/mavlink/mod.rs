@@ -8,6 +8,7 @@
 //! | `answer.rs` | which message goes where |
 //! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`](crate::View) |
 //! | `commands.rs` | commands, and what becomes of each |
+//! | `orders.rs` | those that change the vehicle's state, until it is seen that they have happened |
 //! | `calibration.rs` | calibrations, which take longer than a command |
 //! | `unreadable.rs` | commands and items that this dialect does not have, which are answered too |
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
@@ -33,6 +34,7 @@ mod heard;
 mod identity;
 mod item;
 mod missions;
+mod orders;
 mod parameters;
 mod said;
 mod streams;
@@ -49,6 +51,7 @@ pub use identity::Identity;
 use identity::Own;
 pub use missions::ITEMS;
 use missions::Missions;
+use orders::Orders;
 pub use parameters::short_name;
 use said::Said;
 use stampfly_link::mavlink::Tunnel;
@@ -80,6 +83,7 @@ pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions:
     clients: Vec<Client<C>, N>,
     missions: Missions<C, ITEMS>,
     calibrating: Calibrating<C>,
+    orders: Orders<C>,
     notices: streams::Notices,
     guard: Option<Guard>,
     refused: u32,
@@ -106,6 +110,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             clients: Vec::new(),
             missions: Missions::new(&identity),
             calibrating: Calibrating::new(),
+            orders: Orders::new(),
             notices: streams::Notices::new(),
             guard: None,
             refused: 0,
@@ -203,7 +208,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
     ) {
         self.open(now, from, false);
         self.own.origin = cockpit.origin().or(self.own.origin);
-        let Self { own, clients, missions, calibrating, guard, untrusted, .. } = self;
+        let Self { own, clients, missions, calibrating, orders, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
@@ -237,6 +242,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 client: &mut *client,
                 missions: &mut *missions,
                 calibrating: &mut *calibrating,
+                orders: &mut *orders,
                 asker,
                 seat: Seat::Mavlink(asker[0]),
                 cockpit: &mut *cockpit,
@@ -280,6 +286,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             client.send_due(now, &self.own, &cockpit.view(), put);
             parameters::send_next(client, cockpit.parameters(), put);
         }
+        self.orders.poll(now, &mut self.clients, cockpit, &mut self.missions.runner, put);
         self.missions.poll(now, &self.own, &mut self.clients, cockpit, put);
         self.calibrating.poll(now, &mut self.clients, cockpit, put);
     }

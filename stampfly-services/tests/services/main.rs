@@ -13,5 +13,7 @@ mod mission_line;
 mod msp;
 #[cfg(feature = "network")]
 mod network;
+#[cfg(feature = "mavlink")]
+mod orders;
 mod streams;
 mod tello;
