@@ -4,8 +4,9 @@ use super::commands::{self, Turn};
 use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
 use super::unreadable::Unreadable;
-use super::{parameters, streams};
-use stampfly_link::mavlink::dialects::common::{MavMissionType, TIMESYNC_DATA};
+use super::unserved::Unserved;
+use super::{parameters, streams, targets};
+use stampfly_link::mavlink::dialects::common::{LOG_ENTRY_DATA, MavMissionType, PING_DATA, TIMESYNC_DATA};
 use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
@@ -24,7 +25,20 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
             commands::obey(turn, &commands::Command::from(command));
         }
         Heard::SetPositionTargetLocalNed(target) if own.is_meant(target.target_system, target.target_component) => {
-            commands::go_to(turn, target);
+            targets::fly(turn, target);
+        }
+        Heard::SetPositionTargetGlobalInt(target) if own.is_meant(target.target_system, target.target_component) => {
+            targets::fly_on_earth(turn, target);
+        }
+        Heard::SetAttitudeTarget(target) if own.is_meant(target.target_system, target.target_component) => {
+            turn.client.complain(Unserved::Attitude, &"send places or velocities", turn.put);
+        }
+        Heard::SetMode(mode) if own.is_meant(mode.target_system, AUTOPILOT) => {
+            commands::obey(turn, &commands::Command::from(mode));
+        }
+        // Which channel is which stick, and which of its ends is forward, is a matter of each transmitter.
+        Heard::RcChannelsOverride(channels) if own.is_meant(channels.target_system, channels.target_component) => {
+            turn.client.complain(Unserved::Override, &"send MANUAL_CONTROL", turn.put);
         }
         Heard::ManualControl(sticks) if own.is_meant(sticks.target, AUTOPILOT) => {
             let share = |axis: i16| if axis == i16::MAX { 0.0 } else { f32::from(axis) / 1000.0 };
@@ -38,16 +52,18 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
                 arm: turn.cockpit.view().state().armed,
                 kill: false,
             };
-            _ = turn.cockpit.steer(now, seat, &input.cleaned());
+            if let Err(refusal) = turn.cockpit.steer(now, seat, &input.cleaned()) {
+                turn.client.complain(Unserved::Sticks, &refusal, turn.put);
+            }
         }
         Heard::ParamRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
             turn.client.next_parameter = Some(0);
         }
         Heard::ParamRequestRead(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::read(turn.client, request, turn.cockpit.parameters(), turn.put);
+            parameters::read(turn.client, request, turn.asker, turn.cockpit.parameters(), turn.put);
         }
         Heard::ParamSet(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::set(turn.client, request, turn.cockpit, turn.put);
+            parameters::set(turn.client, request, turn.asker, turn.cockpit, turn.put);
         }
         Heard::SetGpsGlobalOrigin(request) if own.is_meant(request.target_system, AUTOPILOT) => {
             return set_origin(
@@ -55,8 +71,19 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
                 Origin { latitude: request.latitude, longitude: request.longitude, altitude: request.altitude },
             );
         }
-        Heard::Timesync(sync) if sync.tc1 == 0 => {
-            let answer = TIMESYNC_DATA { tc1: (now.as_micros() as i64).saturating_mul(1000), ..sync.clone() };
+        // A record of flights is not kept where MAVLink could read it.
+        Heard::LogRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
+            turn.client.send(&LOG_ENTRY_DATA::default().into(), turn.put);
+        }
+        // With an addressee it is somebody's answer.
+        Heard::Ping(ping) if ping.target_system == 0 && ping.target_component == 0 => {
+            let [target_system, target_component] = turn.asker;
+            turn.client.send(&PING_DATA { target_system, target_component, ..ping.clone() }.into(), turn.put);
+        }
+        Heard::Timesync(sync) if sync.tc1 == 0 && own.is_meant(sync.target_system, sync.target_component) => {
+            let [target_system, target_component] = turn.asker;
+            let tc1 = (now.as_micros() as i64).saturating_mul(1000);
+            let answer = TIMESYNC_DATA { tc1, ts1: sync.ts1, target_system, target_component };
             turn.client.send(&answer.into(), turn.put);
         }
         _ => mission(turn, message),
@@ -129,6 +156,9 @@ pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_,
         Unreadable::Heartbeat => sign_of_life(turn),
         Unreadable::Command { number, target: [to, component] } if own.is_meant(to, component) => {
             commands::refuse(turn.client, number, turn.asker, turn.put);
+        }
+        Unreadable::Target { target: [to, component] } if own.is_meant(to, component) => {
+            turn.client.complain(Unserved::Target, &"not in this frame", turn.put);
         }
         Unreadable::Item { sequence, kind: 0, target: [to, component] } if own.is_meant(to, component) => {
             let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;

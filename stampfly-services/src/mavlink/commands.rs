@@ -6,16 +6,18 @@
 use super::calibration::Calibrating;
 use super::client::{Client, Put};
 use super::identity::Own;
+use super::leading::Leading;
 use super::missions::Missions;
 use super::orders::{Asked, Deed, Orders, say, take_off};
 use super::streams::{STREAMS, make, text};
+use super::unserved::Unserved;
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::{Refusal, Seat};
 use core::fmt::Write;
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
-use stampfly_types::messages::{ArmBlocks, FlightPhase, FlightStatus, GuidedCommand};
-use stampfly_types::{Duration, Instant, Vec3, frame};
+use stampfly_types::messages::{ArmBlocks, FlightStatus, GuidedCommand};
+use stampfly_types::{Duration, Instant, Vec3};
 
 /// A command with its parameters, however it came. Positions of `COMMAND_INT` are whole numbers of units that only a place on
 /// Earth needs, so none is taken from them.
@@ -29,6 +31,15 @@ impl From<&COMMAND_LONG_DATA> for Command {
     fn from(command: &COMMAND_LONG_DATA) -> Self {
         let COMMAND_LONG_DATA { param1, param2, param3, param4, param5, param6, param7, command: kind, .. } = *command;
         Self { kind, parameters: [param1, param2, param3, param4, param5, param6, param7] }
+    }
+}
+
+/// Obeyed as the command that has superseded it, and acknowledged as that, as PX4 does. PX4 has main mode and sub-mode in the upper two bytes of its own modes.
+impl From<&SET_MODE_DATA> for Command {
+    fn from(mode: &SET_MODE_DATA) -> Self {
+        let [_, _, main, sub] = mode.custom_mode.to_le_bytes().map(f32::from);
+        let flags = f32::from(mode.base_mode.bits());
+        Self { kind: MavCmd::MAV_CMD_DO_SET_MODE, parameters: [flags, main, sub, 0.0, 0.0, 0.0, 0.0] }
     }
 }
 
@@ -59,6 +70,7 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub missions: &'t mut Missions<C, ITEMS>,
     pub calibrating: &'t mut Calibrating<C>,
     pub orders: &'t mut Orders<C>,
+    pub leading: &'t mut Leading<C>,
     pub seat: Seat,
     pub cockpit: &'t mut dyn Cockpit,
     pub put: Put<'p, C>,
@@ -208,7 +220,10 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         }
         match deed {
             Deed::Arm => self.missions.runner.arms(self.now),
-            _ => _ = self.missions.runner.halt(),
+            _ => {
+                self.missions.runner.halt();
+                self.leading.stop();
+            }
         }
         Ok(())
     }
@@ -230,6 +245,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         }
         match self.missions.runner.start(self.now, self.seat, self.cockpit) {
             Ok(()) => {
+                self.leading.stop();
                 self.client.send(&self.missions.state(), self.put);
                 MavResult::MAV_RESULT_ACCEPTED
             }
@@ -258,11 +274,16 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             (Some(4), Some(4)) if custom => Some(self.start_mission()),
             (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
             (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
-            _ if custom => Some(MavResult::MAV_RESULT_UNSUPPORTED),
+            _ if custom => self.no_such_mode(),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.does(number, Deed::Guided, 0.0),
-            _ => Some(MavResult::MAV_RESULT_UNSUPPORTED),
+            _ => self.no_such_mode(),
         }
+    }
+
+    fn no_such_mode(&mut self) -> Option<MavResult> {
+        self.client.complain(Unserved::Mode, &"this vehicle does not have it", self.put);
+        Some(MavResult::MAV_RESULT_UNSUPPORTED)
     }
 
     /// Sends one message.
@@ -302,43 +323,4 @@ fn set_interval<C>(now: Instant, client: &mut Client<C>, id: f32, interval_us: f
     };
     due.next = now;
     MavResult::MAV_RESULT_ACCEPTED
-}
-
-/// Sends the vehicle to a place. Programs repeat the same target many times a second: only a new one is passed on.
-pub(super) fn go_to<C: Copy + PartialEq, const ITEMS: usize>(
-    turn: Turn<'_, '_, C, ITEMS>,
-    target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
-) {
-    let Turn { now, client, missions, seat, cockpit, .. } = turn;
-    type Mask = PositionTargetTypemask;
-    let place = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Y_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Z_IGNORE;
-    // A place, or nothing: velocities alone are not flown.
-    if target.type_mask.intersects(place) || cockpit.view().state().phase != FlightPhase::Flying {
-        return;
-    }
-    let Some((_, estimate)) = cockpit.view().estimate() else { return };
-    let asked = Vec3::new(target.x, target.y, target.z);
-    let position = match target.coordinate_frame {
-        MavFrame::MAV_FRAME_LOCAL_NED => asked,
-        MavFrame::MAV_FRAME_LOCAL_OFFSET_NED => estimate.position + asked,
-        MavFrame::MAV_FRAME_BODY_FRD => {
-            estimate.position + frame::from_yaw(frame::yaw(&estimate.attitude)).transform_vector(&asked)
-        }
-        _ => return,
-    };
-    let turns = !target.type_mask.contains(Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE);
-    let yaw = if turns { target.yaw } else { frame::yaw(&estimate.attitude) };
-    let [x, y, z] = asked.to_array();
-    // Without a heading of its own, the present one must not make the target look new.
-    let new = [x, y, z, if turns { yaw } else { 0.0 }];
-    // What a mission has done since makes an old target a new one.
-    if client.target == Some(new) && !missions.runner.is_running() {
-        return;
-    }
-    if cockpit.fly_to(now, seat, GuidedCommand { position, yaw, ..Default::default() }).is_ok() {
-        client.target = Some(new);
-        missions.runner.halt();
-    }
 }

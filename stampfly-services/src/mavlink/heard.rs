@@ -36,6 +36,7 @@ macro_rules! heard {
 heard! {
     COMMAND_INT_DATA => CommandInt,
     COMMAND_LONG_DATA => CommandLong,
+    LOG_REQUEST_LIST_DATA => LogRequestList,
     MANUAL_CONTROL_DATA => ManualControl,
     MISSION_ACK_DATA => MissionAck,
     MISSION_CLEAR_ALL_DATA => MissionClearAll,
@@ -49,7 +50,12 @@ heard! {
     PARAM_REQUEST_LIST_DATA => ParamRequestList,
     PARAM_REQUEST_READ_DATA => ParamRequestRead,
     PARAM_SET_DATA => ParamSet,
+    PING_DATA => Ping,
+    RC_CHANNELS_OVERRIDE_DATA => RcChannelsOverride,
+    SET_ATTITUDE_TARGET_DATA => SetAttitudeTarget,
     SET_GPS_GLOBAL_ORIGIN_DATA => SetGpsGlobalOrigin,
+    SET_MODE_DATA => SetMode,
+    SET_POSITION_TARGET_GLOBAL_INT_DATA => SetPositionTargetGlobalInt,
     SET_POSITION_TARGET_LOCAL_NED_DATA => SetPositionTargetLocalNed,
     TIMESYNC_DATA => Timesync,
 }

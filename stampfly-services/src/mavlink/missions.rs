@@ -62,7 +62,7 @@ impl<C, const ITEMS: usize> Upload<C, ITEMS> {
     fn has_come(&mut self, now: Instant) {
         if self.questions == 1 {
             self.round_trip = now.since(self.asked);
-            self.patience = (self.round_trip * 2).clamp(SOONEST, LATEST);
+            self.patience = (self.round_trip * 2).max(SOONEST).min(LATEST);
         }
         (self.asked, self.questions) = (now, 1);
     }

@@ -12,6 +12,9 @@
 //! | `calibration.rs` | calibrations, which take longer than a command |
 //! | `unreadable.rs` | commands and items that this dialect does not have, which are answered too |
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
+//! | `targets.rs` | set-points: a place to fly to, or how to move |
+//! | `leading.rs` | velocities, flown as a way-point that moves |
+//! | `unserved.rs` | what is not done, said aloud once in a while |
 //! | `missions.rs` | the mission protocol |
 //! | `item.rs` | a mission item, and the [step](crate::mission::Step) that it means |
 //!
@@ -33,12 +36,15 @@ mod commands;
 mod heard;
 mod identity;
 mod item;
+mod leading;
 mod missions;
 mod orders;
 mod parameters;
 mod said;
 mod streams;
+mod targets;
 mod unreadable;
+mod unserved;
 
 use crate::cockpit::Cockpit;
 use crate::refusal::Seat;
@@ -49,6 +55,7 @@ use core::fmt::Write;
 use heapless::Vec;
 pub use identity::Identity;
 use identity::Own;
+use leading::Leading;
 pub use missions::ITEMS;
 use missions::Missions;
 use orders::Orders;
@@ -84,6 +91,7 @@ pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions:
     missions: Missions<C, ITEMS>,
     calibrating: Calibrating<C>,
     orders: Orders<C>,
+    leading: Leading<C>,
     notices: streams::Notices,
     guard: Option<Guard>,
     refused: u32,
@@ -111,6 +119,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             missions: Missions::new(&identity),
             calibrating: Calibrating::new(),
             orders: Orders::new(),
+            leading: Leading::new(),
             notices: streams::Notices::new(),
             guard: None,
             refused: 0,
@@ -208,7 +217,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
     ) {
         self.open(now, from, false);
         self.own.origin = cockpit.origin().or(self.own.origin);
-        let Self { own, clients, missions, calibrating, orders, guard, untrusted, .. } = self;
+        let Self { own, clients, missions, calibrating, orders, leading, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
@@ -243,6 +252,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 missions: &mut *missions,
                 calibrating: &mut *calibrating,
                 orders: &mut *orders,
+                leading: &mut *leading,
                 asker,
                 seat: Seat::Mavlink(asker[0]),
                 cockpit: &mut *cockpit,
@@ -287,6 +297,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             parameters::send_next(client, cockpit.parameters(), put);
         }
         self.orders.poll(now, &mut self.clients, cockpit, &mut self.missions.runner, put);
+        self.leading.poll(now, cockpit);
         self.missions.poll(now, &self.own, &mut self.clients, cockpit, put);
         self.calibrating.poll(now, &mut self.clients, cockpit, put);
     }

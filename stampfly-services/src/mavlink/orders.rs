@@ -27,7 +27,7 @@ use stampfly_types::messages::{CommandSource, FlightPhase, FlightStatus, GuidedC
 use stampfly_types::{Duration, Instant, Vec3};
 
 /// Commands that are waited for at once. Whoever asks for more is told to try later, but for what ends a flight.
-const AT_ONCE: usize = 4;
+const AT_ONCE: usize = 3;
 /// A vehicle that has not done it after this long does not. Programs send a command again after half a second, and three times in all.
 const SOON: Duration = Duration::from_millis(1_500);
 /// No landing takes longer.
@@ -127,7 +127,8 @@ struct Order<C> {
     /// A take-off to this height, of which the vehicle is asked as soon as it is armed.
     rises_to: Option<f32>,
     since: Instant,
-    told: Instant,
+    /// How often it was told that it goes on.
+    told: u8,
     /// Refusals to arm that there were before.
     refused: u32,
 }
@@ -177,7 +178,7 @@ impl<C: Copy + PartialEq> Orders<C> {
         cockpit: &dyn Cockpit,
     ) -> bool {
         let refused = refusals(cockpit);
-        self.all.push(Order { asked, seat, rises_to, since: now, told: now, refused }).is_ok()
+        self.all.push(Order { asked, seat, rises_to, since: now, told: 0, refused }).is_ok()
     }
 
     /// Looks what has happened, and acknowledges it. Call it about fifty times a second.
@@ -236,8 +237,8 @@ impl<C> Order<C> {
         if waited >= if lands { LANDING } else { SOON } {
             return Fate::Failed;
         }
-        if lands && (self.told == self.since || now.since(self.told) >= AGAIN) {
-            self.told = now;
+        if lands && waited >= AGAIN * self.told.into() {
+            self.told = self.told.saturating_add(1);
             return Fate::GoesOn;
         }
         Fate::Waits
@@ -259,7 +260,7 @@ fn refusals(cockpit: &dyn Cockpit) -> u32 {
 }
 
 /// Why a vehicle in this state does not do something, as far as its state says so.
-fn why_not(status: &FlightStatus) -> &'static str {
+pub(super) fn why_not(status: &FlightStatus) -> &'static str {
     match status {
         status if !status.armed => status.blocks.names().next().unwrap_or("motors are off"),
         FlightStatus { phase: FlightPhase::Landing, .. } => "it lands",

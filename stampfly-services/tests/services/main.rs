@@ -16,4 +16,6 @@ mod network;
 #[cfg(feature = "mavlink")]
 mod orders;
 mod streams;
+#[cfg(feature = "mavlink")]
+mod targets;
 mod tello;

@@ -280,9 +280,9 @@ fn disarming_in_the_air_goes_on_until_it_has_landed() {
 }
 
 #[test]
-fn there_is_room_for_four_and_always_for_what_ends_a_flight() {
+fn there_is_room_for_three_and_always_for_what_ends_a_flight() {
     let mut scene = Scene::new(Vehicle::standing());
-    for component in 0..4 {
+    for component in 0..3 {
         assert_eq!(scene.asks([255, component], ARM, ON), Said::default());
     }
     assert_eq!(scene.asks([255, 4], ARM, ON).results(), [MavResult::MAV_RESULT_TEMPORARILY_REJECTED]);
@@ -292,7 +292,7 @@ fn there_is_room_for_four_and_always_for_what_ends_a_flight() {
     assert_eq!(scene.asked(), [GuidedKind::Kill]);
     let said = scene.passes(20);
     let told: Vec<_> = said.results.iter().map(|(_, result, [_, component])| (*result, *component)).collect();
-    assert_eq!(told, [(ACCEPTED, 0), (ACCEPTED, 1), (ACCEPTED, 2), (ACCEPTED, 3)]);
+    assert_eq!(told, [(ACCEPTED, 0), (ACCEPTED, 1), (ACCEPTED, 2)]);
     // Whoever is gone is told nothing.
     scene.vehicle.status(|status| status.armed = false);
     scene.asks(STATION, ARM, ON);
