@@ -1,8 +1,9 @@
 //! Which message goes where.
 
-use super::commands::{self, Turn};
+use super::commands::{self, NO_ITEM, Turn};
 use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
+use super::orders::say;
 use super::unreadable::Unreadable;
 use super::unserved::Unserved;
 use super::{parameters, streams, targets};
@@ -118,8 +119,17 @@ fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>
             missions.clear(client, asker, request.mission_type, put);
         }
         Heard::MissionSetCurrent(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.set_current(usize::from(request.seq));
+            if !missions.set_current(usize::from(request.seq)) {
+                say(client, "not the current item", &NO_ITEM, put);
+            }
             client.send(&missions.state(), put);
+        }
+        // Parts of a mission are not exchanged.
+        Heard::MissionWritePartialList(request) if own.is_meant(request.target_system, request.target_component) => {
+            missions.refuse(client, asker, request.mission_type, put);
+        }
+        Heard::MissionRequestPartialList(request) if own.is_meant(request.target_system, request.target_component) => {
+            missions.refuse(client, asker, request.mission_type, put);
         }
         Heard::MissionAck(ack) if own.is_meant(ack.target_system, ack.target_component) => {
             missions.acknowledged(client, asker, ack);

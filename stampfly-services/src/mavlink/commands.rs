@@ -13,7 +13,6 @@ use super::streams::{STREAMS, make, text};
 use super::unserved::Unserved;
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::{Refusal, Seat};
-use core::fmt::Write;
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{ArmBlocks, FlightStatus, GuidedCommand};
@@ -59,6 +58,9 @@ impl From<&COMMAND_INT_DATA> for Command {
 fn whole(number: f32) -> Option<u32> {
     (number.is_finite() && (0.0..=16_777_215.0).contains(&number)).then_some(number as u32)
 }
+
+/// Why an item cannot be the next one.
+pub(super) const NO_ITEM: &str = "the mission has no such item";
 
 /// What a command meets: the vehicle, who asks, and where answers go.
 pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
@@ -132,14 +134,20 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                 Some(0) => self.start_mission(),
                 // Another first item than the first.
                 Some(place) if self.missions.set_current(place as usize) => self.start_mission(),
-                _ => MavResult::MAV_RESULT_DENIED,
+                _ => {
+                    self.not_started(&NO_ITEM);
+                    MavResult::MAV_RESULT_DENIED
+                }
             },
             MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => return self.does(number, Deed::Hold, *p7),
             MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 1.0 => self.start_mission(),
             MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => {
                 match whole(*p1).is_some_and(|place| self.missions.set_current(place as usize)) {
                     true => MavResult::MAV_RESULT_ACCEPTED,
-                    false => MavResult::MAV_RESULT_DENIED,
+                    false => {
+                        say(self.client, "not the current item", &NO_ITEM, self.put);
+                        MavResult::MAV_RESULT_DENIED
+                    }
                 }
             }
             MavCmd::MAV_CMD_REQUEST_MESSAGE => whole(*p1).map_or(MavResult::MAV_RESULT_UNSUPPORTED, |id| self.show(id)),
@@ -171,6 +179,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             return Some(MavResult::MAV_RESULT_IN_PROGRESS);
         }
         if self.orders.is_full() && !deed.ends_a_flight() {
+            say(self.client, deed.denied(), &"too many commands at once", self.put);
             return Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
         }
         let height = if height.is_finite() && height > 0.0 { height } else { self.own.identity.take_off_height };
@@ -183,11 +192,11 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             return Some(MavResult::MAV_RESULT_DENIED);
         }
         if let Some(why) = deed.refusal(&status) {
-            say(self.client, deed, "denied", &why, self.put);
+            say(self.client, deed.denied(), &why, self.put);
             return Some(MavResult::MAV_RESULT_DENIED);
         }
         if let Err(refusal) = self.ask_for(deed, height) {
-            say(self.client, deed, "denied", &refusal, self.put);
+            say(self.client, deed.denied(), &refusal, self.put);
             return Some(result(Err(refusal)));
         }
         let has_happened = deed.has_happened(&status);
@@ -229,7 +238,11 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     }
 
     fn request(&mut self, request: Request) -> MavResult {
-        result(self.cockpit.request(self.now, request))
+        let asked = self.cockpit.request(self.now, request);
+        if let Err(refusal) = &asked {
+            say(self.client, "denied", refusal, self.put);
+        }
+        result(asked)
     }
 
     fn start_mission(&mut self) -> MavResult {
@@ -257,14 +270,11 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     }
 
     fn not_started(&mut self, why: &dyn core::fmt::Display) {
-        let mut words = heapless::String::<50>::new();
-        // What does not fit is cut off.
-        _ = write!(words, "{why}");
-        self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "mission not started: ", &words), self.put);
+        say(self.client, "mission not started", why, self.put);
     }
 
     /// Modes have numbers of their own in every autopilot. Understood are MAVLink's own flags, "auto" for a mission and "guided" for staying in place, and
-    /// the numbers of PX4 (main mode 4, "auto"), which programs send to whatever is not ArduPilot.
+    /// the numbers of PX4 (main modes 4, "auto", and 6, "offboard"), which programs send to whatever is not ArduPilot.
     fn set_mode(&mut self, number: u16, [flags, main, sub]: [f32; 3]) -> Option<MavResult> {
         let flags = whole(flags).and_then(|flags| u8::try_from(flags).ok()).map(MavModeFlag::from_bits_truncate);
         let Some(flags) = flags else { return Some(MavResult::MAV_RESULT_DENIED) };
@@ -274,6 +284,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             (Some(4), Some(4)) if custom => Some(self.start_mission()),
             (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
             (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
+            // Set-points are flown in no mode of their own; programs ask for one before they send them.
+            (Some(6), _) if custom => self.does(number, Deed::Guided, 0.0),
             _ if custom => self.no_such_mode(),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.does(number, Deed::Guided, 0.0),

@@ -266,6 +266,11 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         client.send(&self.state(), put);
     }
 
+    /// A station wants something that is not done with missions.
+    pub fn refuse(&self, client: &mut Client<C>, to: [u8; 2], kind: Kind, put: Put<'_, C>) {
+        acknowledge(client, to, (Answer::MAV_MISSION_UNSUPPORTED, kind, 0), put);
+    }
+
     /// A station wants to know how many there are.
     pub fn list(
         &self,

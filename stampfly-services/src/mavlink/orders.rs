@@ -50,24 +50,25 @@ pub(super) enum Deed {
     Return,
 }
 
-/// A line of the table: what it is called, what the vehicle is asked for, and when it has happened.
+/// A line of the table: what is said when it is denied, what the vehicle is asked for, and when it has happened.
 type Line = (&'static str, GuidedKind, fn(&FlightStatus) -> bool);
 
 impl Deed {
     const fn line(self) -> Line {
         match self {
-            Self::Arm => ("arming", GuidedKind::Arm, |now| now.armed),
-            Self::Disarm => ("disarming", GuidedKind::Disarm, |now| !now.armed),
-            Self::Kill => ("motors off", GuidedKind::Kill, |now| !now.armed),
-            Self::TakeOff => ("take-off", GuidedKind::TakeOff, rises),
-            Self::Land => ("landing", GuidedKind::Land, |now| !now.armed || now.phase == FlightPhase::Landing),
-            Self::Hold => ("hold", GuidedKind::Hold, is_led),
-            Self::Guided => ("guided mode", GuidedKind::Hold, |now| !now.armed || is_led(now)),
-            Self::Return => ("return", GuidedKind::WayPoint, is_led),
+            Self::Arm => ("arming denied", GuidedKind::Arm, |now| now.armed),
+            Self::Disarm => ("disarming denied", GuidedKind::Disarm, |now| !now.armed),
+            Self::Kill => ("motors off denied", GuidedKind::Kill, |now| !now.armed),
+            Self::TakeOff => ("take-off denied", GuidedKind::TakeOff, rises),
+            Self::Land => ("landing denied", GuidedKind::Land, |now| !now.armed || now.phase == FlightPhase::Landing),
+            Self::Hold => ("hold denied", GuidedKind::Hold, is_led),
+            Self::Guided => ("guided mode denied", GuidedKind::Hold, |now| !now.armed || is_led(now)),
+            Self::Return => ("return denied", GuidedKind::WayPoint, is_led),
         }
     }
 
-    pub const fn name(self) -> &'static str {
+    /// What is said when it is denied.
+    pub const fn denied(self) -> &'static str {
         self.line().0
     }
 
@@ -201,11 +202,11 @@ impl<C: Copy + PartialEq> Orders<C> {
                 Fate::GoesOn => MavResult::MAV_RESULT_IN_PROGRESS,
                 Fate::Done => MavResult::MAV_RESULT_ACCEPTED,
                 Fate::Denied(why) => {
-                    why.into_iter().for_each(|why| say(client, deed, "denied", &why, put));
+                    why.into_iter().for_each(|why| say(client, deed.denied(), &why, put));
                     MavResult::MAV_RESULT_DENIED
                 }
                 Fate::Failed => {
-                    say(client, deed, "failed", &why_not(&cockpit.view().state()), put);
+                    say(client, deed.denied(), &why_not(&cockpit.view().state()), put);
                     MavResult::MAV_RESULT_FAILED
                 }
             };
@@ -273,9 +274,9 @@ pub(super) fn why_not(status: &FlightStatus) -> &'static str {
 /// Says to people why something is not done.
 // By itself: its room for a sentence is on the stack once.
 #[inline(never)]
-pub(super) fn say<C>(client: &mut Client<C>, deed: Deed, what: &str, why: &dyn fmt::Display, put: Put<'_, C>) {
+pub(super) fn say<C>(client: &mut Client<C>, what: &str, why: &dyn fmt::Display, put: Put<'_, C>) {
     let mut sentence = String::<96>::new();
     // What is too long is cut.
-    _ = write!(sentence, "{} {what}: {why}", deed.name());
+    _ = write!(sentence, "{what}: {why}");
     client.say(MavSeverity::MAV_SEVERITY_ERROR, &sentence, put);
 }

@@ -433,3 +433,15 @@ fn requests_are_served_in_any_order_and_as_often_as_they_come() {
     let expected: Vec<_> = wanted.iter().map(|seq| items[usize::from(*seq)].clone()).collect();
     same(&served, &expected);
 }
+
+#[test]
+fn parts_of_a_mission_are_refused_and_so_is_an_item_that_is_not_there() {
+    let mut line = Line::new(Quality::clean(0), 0);
+    let (target_system, target_component) = (7, 1);
+    let write = MISSION_WRITE_PARTIAL_LIST_DATA { target_system, target_component, ..Default::default() };
+    let read = MISSION_REQUEST_PARTIAL_LIST_DATA { target_system, target_component, ..Default::default() };
+    line.says(255, 190, &MavMessage::MISSION_WRITE_PARTIAL_LIST(write));
+    line.says(255, 190, &MavMessage::MISSION_REQUEST_PARTIAL_LIST(read));
+    line.passes();
+    assert_eq!(line.results(255), [(MavMissionResult::MAV_MISSION_UNSUPPORTED, 0); 2]);
+}

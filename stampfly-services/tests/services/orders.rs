@@ -139,7 +139,7 @@ fn what_the_mode_machine_refuses_is_denied_with_its_reasons_and_what_never_happe
     scene.asks(STATION, ARM, ON);
     assert_eq!(scene.passes(1_480), Said::default());
     let said = scene.passes(40);
-    assert_eq!((said.results(), &said.texts[0][..]), (vec![FAILED], "arming failed: motors are off"));
+    assert_eq!((said.results(), &said.texts[0][..]), (vec![FAILED], "arming denied: motors are off"));
 }
 
 #[test]
@@ -200,6 +200,9 @@ fn what_cannot_be_is_denied_at_once_and_people_are_told_why() {
     assert_eq!(denied(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, OFF), "hold denied: motors are off");
     assert_eq!(denied(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, OFF), "return denied: motors are off");
     assert_eq!(denied(MavCmd::MAV_CMD_MISSION_START, OFF), "mission not started: there is none");
+    assert_eq!(denied(MavCmd::MAV_CMD_MISSION_START, ON), "mission not started: the mission has no such item");
+    let current = denied(MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT, ON);
+    assert_eq!(current, "not the current item: the mission has no such item");
     assert_eq!(scene.asked(), []);
     // Standing with its motors off is what a landing ends with, and what a program's arming begins with.
     assert_eq!(scene.asks(STATION, MavCmd::MAV_CMD_NAV_LAND, OFF).results(), [ACCEPTED]);
@@ -214,7 +217,7 @@ fn what_cannot_be_is_denied_at_once_and_people_are_told_why() {
     scene.vehicle.status(|status| status.phase = FlightPhase::Landing);
     assert_eq!(scene.asks(STATION, TAKE_OFF, OFF), Said::default());
     let said = scene.passes(1_520);
-    assert_eq!((said.results(), &said.texts[..]), (vec![FAILED], &["take-off failed: it lands".to_owned()][..]));
+    assert_eq!((said.results(), &said.texts[..]), (vec![FAILED], &["take-off denied: it lands".to_owned()][..]));
 }
 
 #[test]

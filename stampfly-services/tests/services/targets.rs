@@ -366,6 +366,9 @@ fn a_ping_is_answered_a_log_is_not_there_and_a_mode_is_set() {
     let answers = scene.says(&mode(0x0304_0000, custom));
     assert_eq!(result(&answers), (command, MavResult::MAV_RESULT_ACCEPTED, 255));
     assert_eq!(scene.asked().iter().map(|command| command.kind).collect::<Vec<_>>(), [GuidedKind::Hold]);
+    // And of set-points.
+    assert_eq!(result(&scene.says(&mode(0x0006_0000, custom))), (command, MavResult::MAV_RESULT_ACCEPTED, 255));
+    scene.asked();
     // ArduPilot's number of something.
     let answers = scene.says(&mode(4, custom));
     assert_eq!(result(&answers), (command, MavResult::MAV_RESULT_UNSUPPORTED, 255));
