@@ -230,8 +230,10 @@ struct Passing {
 
 /// Finds frames in what a port hands over; `N` bytes are the longest frame that it can take.
 ///
-/// 64 are enough for what a small flight controller is asked, 262 for every frame of version 1 that is not "jumbo". A longer one is passed over, and
-/// [`too_long`](Self::too_long) says which it was. A frame that is cut short costs itself alone: the next one is found in what seemed to be the rest of it, as soon as enough bytes
+/// 64 are enough for what a small flight controller is asked, 262 for every frame of version 1 that
+/// is not "jumbo". A longer one is passed over, and [`too_long`](Self::too_long) says which it was.
+/// A frame that is cut short costs itself alone: the next one is found in what seemed to be the
+/// rest of it, as soon as enough bytes
 /// have come to show that it is not. For a byte that shows it, the work grows with `N`²; for others it does not depend on `N`.
 #[derive(Clone, Debug)]
 pub struct MspDecoder<const N: usize> {
@@ -271,14 +273,14 @@ impl<const N: usize> MspDecoder<N> {
         self.passing = None;
     }
 
-    /// The frame that the last byte has ended and that there was no room for, without its payload; once. What its payload looks like is taken for frames all the
-    /// same. Ask after a [`feed`](Self::feed) that returned none: whoever asks waits for an answer.
+    /// The frame that the last byte has ended and that there was no room for, without its payload;
+    /// once. What its payload looks like is taken for frames all the same. Ask after a
+    /// [`feed`](Self::feed) that returned none: a configurator waits for an answer.
     ///
     /// ```
-    /// use stampfly_link::msp::{MspDecoder, MspFrame};
-    /// let (mut decoder, mut long) = (MspDecoder::<64>::new(), [0; 128]);
-    /// let length = MspFrame { payload: &[7; 100], ..MspFrame::request(200) }.write(&mut long).unwrap_or(0);
-    /// let ids: Vec<_> = long[..length]
+    /// use stampfly_link::msp::{MspDecoder, MspFrame}; let (mut decoder, mut long) =
+    /// (MspDecoder::<64>::new(), [0; 128]); let length = MspFrame { payload: &[7; 100],
+    /// ..MspFrame::request(200) }.write(&mut long).unwrap_or(0); let ids: Vec<_> = long[..length]
     ///     .iter()
     ///     .filter_map(|byte| match decoder.feed(*byte) {
     ///         Some(frame) => Some(frame.id),
@@ -292,7 +294,8 @@ impl<const N: usize> MspDecoder<N> {
         ended.filter(|passing| passing.check == 0).map(|passing| passing.frame)
     }
 
-    /// One more byte of a frame that there is no room for. The last makes its check zero, if it is sound.
+    /// One more byte of a frame that there is no room for. The last makes its check zero, if it is
+    /// sound.
     #[inline]
     fn pass(&mut self, byte: u8) {
         let Some(passing) = &mut self.passing else { return };

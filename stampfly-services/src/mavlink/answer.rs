@@ -37,7 +37,8 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
         Heard::SetMode(mode) if own.is_meant(mode.target_system, AUTOPILOT) => {
             commands::obey(turn, &commands::Command::from(mode));
         }
-        // Which channel is which stick, and which of its ends is forward, is a matter of each transmitter.
+        // Which channel is which stick, and which of its ends is forward, is a matter of each
+        // transmitter.
         Heard::RcChannelsOverride(channels) if own.is_meant(channels.target_system, channels.target_component) => {
             turn.client.complain(Unserved::Override, &"send MANUAL_CONTROL", turn.put);
         }
@@ -76,7 +77,7 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
         Heard::LogRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
             turn.client.send(&LOG_ENTRY_DATA::default().into(), turn.put);
         }
-        // With an addressee it is somebody's answer.
+        // With an addressee it is an answer.
         Heard::Ping(ping) if ping.target_system == 0 && ping.target_component == 0 => {
             let [target_system, target_component] = turn.asker;
             turn.client.send(&PING_DATA { target_system, target_component, ..ping.clone() }.into(), turn.put);

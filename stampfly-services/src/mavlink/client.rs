@@ -32,7 +32,8 @@ pub(super) struct Due {
 pub(super) enum Fed {
     /// A message of this system and component that is for a vehicle.
     Message([u8; 2], Heard),
-    /// A message of this system and component that the dialect cannot read, but that wants an answer.
+    /// A message of this system and component that the dialect cannot read, but that wants an
+    /// answer.
     Unreadable([u8; 2], Unreadable),
     /// Bytes of another protocol, of this system.
     Tunnel(u8, Tunnel),

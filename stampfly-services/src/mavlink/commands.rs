@@ -1,7 +1,9 @@
 //! Commands, and what becomes of each.
 //!
-//! What changes the vehicle's state is acknowledged when it [has happened](super::orders); arming that would be refused is denied at once, with the reasons as texts. What a
-//! program may ask for while another one commands is the [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
+//! What changes the vehicle's state is acknowledged when it [has happened](super::orders); arming
+//! that would be refused is denied at once, with the reasons as texts. What a program may ask for
+//! while another one commands is the [lease](crate::lease)'s decision, acknowledged as
+//! `NOT_IN_CONTROL`.
 
 use super::calibration::Calibrating;
 use super::client::{Client, Put};
@@ -33,7 +35,8 @@ impl From<&COMMAND_LONG_DATA> for Command {
     }
 }
 
-/// Obeyed as the command that has superseded it, and acknowledged as that, as PX4 does. PX4 has main mode and sub-mode in the upper two bytes of its own modes.
+/// Obeyed as the command that has superseded it, and acknowledged as that, as PX4 does. PX4 has
+/// main mode and sub-mode in the upper two bytes of its own modes.
 impl From<&SET_MODE_DATA> for Command {
     fn from(mode: &SET_MODE_DATA) -> Self {
         let [_, _, main, sub] = mode.custom_mode.to_le_bytes().map(f32::from);
@@ -78,7 +81,7 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub put: Put<'p, C>,
 }
 
-/// Does what is asked, and acknowledges it, now or when it has happened.
+/// Carries a command out, and acknowledges it, now or when it has happened.
 pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
     let number = command.kind as u16;
     let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
@@ -98,9 +101,11 @@ pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, asker: [u8; 2], put
     acknowledge(client, number, asker, (MavResult::MAV_RESULT_UNSUPPORTED, 0), put);
 }
 
-/// Says to who has asked what has become of the command with this number, and how far it is in per cent.
+/// Says to who has asked what has become of the command with this number, and how far it is in per
+/// cent.
 ///
-/// Written as bytes, because the dialect has not every number: the command, its result, the progress, four bytes of no meaning here, and the addressee.
+/// Written as bytes, because the dialect has not every number: the command, its result, the
+/// progress, four bytes of no meaning here, and the addressee.
 pub(super) fn acknowledge<C>(
     client: &mut Client<C>,
     number: u16,
@@ -167,7 +172,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         })
     }
 
-    /// Asks the vehicle for something that changes its state. `None`: it is acknowledged when that has happened. A take-off has a height, m.
+    /// Asks the vehicle for something that changes its state. `None`: it is acknowledged when that
+    /// has happened. A take-off has a height, m.
     fn does(&mut self, number: u16, deed: Deed, height: f32) -> Option<MavResult> {
         let status = self.cockpit.view().state();
         let asked = Asked { client: self.client.id, asker: self.asker, number, deed };
@@ -204,7 +210,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         (!waits).then_some(MavResult::MAV_RESULT_ACCEPTED)
     }
 
-    /// Would arming be refused? Then every reason is said. That nobody is heard is none, for a command is.
+    /// Would arming be refused? Then every reason is said. Silence of all programs is none: the
+    /// command ends it.
     fn is_blocked(&mut self, status: &FlightStatus) -> bool {
         let blocks = status.blocks.without(ArmBlocks::NO_LINK);
         if status.armed || blocks.is_empty() {
@@ -274,7 +281,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     }
 
     /// Modes have numbers of their own in every autopilot. Understood are MAVLink's own flags, "auto" for a mission and "guided" for staying in place, and
-    /// the numbers of PX4 (main modes 4, "auto", and 6, "offboard"), which programs send to whatever is not ArduPilot.
+    /// the numbers of PX4 (main modes 4, "auto", and 6, "offboard"), which programs send to
+    /// whatever is not ArduPilot.
     fn set_mode(&mut self, number: u16, [flags, main, sub]: [f32; 3]) -> Option<MavResult> {
         let flags = whole(flags).and_then(|flags| u8::try_from(flags).ok()).map(MavModeFlag::from_bits_truncate);
         let Some(flags) = flags else { return Some(MavResult::MAV_RESULT_DENIED) };
@@ -284,7 +292,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             (Some(4), Some(4)) if custom => Some(self.start_mission()),
             (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
             (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
-            // Set-points are flown in no mode of their own; programs ask for one before they send them.
+            // Set-points are flown in no mode of their own; programs ask for one before they send
+            // them.
             (Some(6), _) if custom => self.does(number, Deed::Guided, 0.0),
             _ if custom => self.no_such_mode(),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),

@@ -1,11 +1,13 @@
 //! Velocities that a program sends again and again.
 //!
-//! A vehicle is asked to fly to places, and knows how fast it may get there. So a velocity is flown as a way-point that moves ahead of the vehicle's path at this
-//! velocity, fifty times a second: the path follows at the distance in which it could stop, whatever its limits are. When the program has said nothing for half a
-//! second, the vehicle stays where it is, as PX4 and ArduPilot do after half a second and after three.
+//! A vehicle is asked to fly to places, and knows how fast it may get there. So a velocity is flown
+//! as a way-point that moves ahead of the vehicle's path at this velocity, fifty times a second:
+//! the path follows at the distance in which it could stop, whatever its limits are. When the
+//! program has said nothing for half a second, the vehicle stays where it is, as PX4 and ArduPilot
+//! do after half a second and after three.
 //!
-//! A pilot who takes the sticks, a landing and the failsafe end it. The program has to fall silent before it may begin again: its stream must not take the vehicle back
-//! from the pilot.
+//! A pilot who takes the sticks, a landing and the failsafe end it. The program has to fall silent
+//! before it may begin again: its stream must not take the vehicle back from the pilot.
 
 use crate::cockpit::Cockpit;
 use crate::refusal::{Refusal, Seat};
@@ -14,14 +16,17 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, Instant, Vec3, math};
 
-/// A program that was not heard for this long does not lead any more, and a vehicle that does not follow after this long will not.
+/// A program that was not heard for this long does not lead any more, and a vehicle that does not
+/// follow after this long will not.
 const SILENCE: Duration = Duration::from_millis(500);
-/// The way-point is at most so far ahead, m, and this much farther, s, for the velocity of the path: about what it takes to stop.
+/// The way-point is at most so far ahead, m, and this much farther, s, for the velocity of the
+/// path: about what it takes to stop.
 const AHEAD: f32 = 0.15;
 const TO_STOP: f32 = 0.6;
 /// The heading that is wanted is at most so far ahead, rad.
 const TURN_AHEAD: f32 = 0.5;
-/// The path may be faster than the way-point by this factor, as fast as it is, and this fast at least, m/s, so that it comes to where a slow one is.
+/// The path may be faster than the way-point by this factor, as fast as it is, and this fast at
+/// least, m/s, so that it comes to where a slow one is.
 const FASTER: f32 = 1.2;
 const SLOWEST: f32 = 0.3;
 /// Between two moves of the way-point at most, s.

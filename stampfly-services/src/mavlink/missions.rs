@@ -1,13 +1,17 @@
 //! The mission protocol: upload, download, clear, and what stations are told while a mission is flown.
 //!
-//! From [Mission Protocol](https://mavlink.io/en/services/mission.html). One partner uploads at a time, told apart by its connection, system and component, because
-//! routers put several stations on one connection; others are denied meanwhile. The vehicle asks for one item after the other. It asks again when none comes in time,
-//! and never because of an item that it did not wait for: an answer to each duplicate would double the questions with every item. The time that it waits is twice the
-//! round trip that was seen last, doubles with each question that stays unanswered, and the upload is given up after as many questions as the protocol says.
+//! From [Mission Protocol](https://mavlink.io/en/services/mission.html). One partner uploads at a
+//! time, told apart by its connection, system and component, because routers put several stations
+//! on one connection; others are denied meanwhile. The vehicle asks for one item after the other.
+//! It asks again when none comes in time, and never because of an item that it did not wait for: an
+//! answer to each duplicate would double the questions with every item. The time that it waits is
+//! twice the round trip that was seen last, doubles with each question that stays unanswered, and
+//! the upload is given up after as many questions as the protocol says.
 //!
-//! The mission that is in force is replaced when the last item of the new one has come, and not while it is flown. A partner that sends its last item again has not
-//! heard that it was accepted, and is told again. Geofences and rally points are kinds of missions that this vehicle does not have: their lists are empty, and uploads
-//! of them refused.
+//! The mission that is in force is replaced when the last item of the new one has come, and not
+//! while it is flown. A partner that sends its last item again has not heard that it was accepted,
+//! and is told again. Geofences and rally points are kinds of missions that this vehicle does not
+//! have: their lists are empty, and uploads of them refused.
 
 use super::client::{Client, Put};
 use super::identity::{Identity, Own};
@@ -23,12 +27,15 @@ use stampfly_types::{Duration, Instant};
 
 /// Items of a mission, unless a vehicle has room for another number.
 pub const ITEMS: usize = 64;
-/// An item that has not come is asked for again after this long at the soonest, and so many times: the protocol's own figures.
+/// An item that has not come is asked for again after this long at the soonest, and so many times:
+/// the protocol's own figures.
 const SOONEST: Duration = Duration::from_millis(250);
 const RETRIES: u8 = 5;
-/// And after this long while no round trip was seen: a link of 1.2 s brings the first item before the third question.
+/// And after this long while no round trip was seen: a link of 1.2 s brings the first item before
+/// the third question.
 const FIRST: Duration = Duration::from_millis(500);
-/// And after this long at the latest: a partner that is gone holds the others up for 13 s, or 18 s where a round trip takes more than a second.
+/// And after this long at the latest: a partner that is gone holds the others up for 13 s, or 18 s
+/// where a round trip takes more than a second.
 const LATEST: Duration = Duration::from_secs(3);
 
 type Kind = MavMissionType;
@@ -58,7 +65,8 @@ struct Upload<C, const ITEMS: usize> {
 }
 
 impl<C, const ITEMS: usize> Upload<C, ITEMS> {
-    /// The item that was asked for has come. Only one that was asked for once tells how long a round trip takes: another may be the answer to any of the questions.
+    /// The item that was asked for has come. Only one that was asked for once tells how long a
+    /// round trip takes: another may be the answer to any of the questions.
     fn has_come(&mut self, now: Instant) {
         if self.questions == 1 {
             self.round_trip = now.since(self.asked);
@@ -136,7 +144,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         self.upload.as_ref().is_some_and(|upload| upload.partner != *partner)
     }
 
-    /// A station wants to upload so many items. One that says so during its own upload begins again.
+    /// A station wants to upload so many items. One that says so during its own upload begins
+    /// again.
     pub fn count(
         &mut self,
         now: Instant,
@@ -161,7 +170,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         acknowledge(client, address, (refusal, request.mission_type, 0), put);
     }
 
-    /// Is this count the one of the upload that was accepted just now, come twice? What a station says after it has heard that comes a round trip later.
+    /// Is this count the one of the upload that was accepted just now, come twice? What a station
+    /// says after it has heard that comes a round trip later.
     fn is_echo(&self, now: Instant, partner: &Partner<C>, count: u16) -> bool {
         let last = self.accepted.as_ref().filter(|_| self.upload.is_none());
         last.is_some_and(|last| last.partner == *partner && last.count == count && now.since(last.at) < last.round_trip)
@@ -301,7 +311,8 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         }
     }
 
-    /// A station wants none. One that is flown, or that another partner is about to replace, is not taken away.
+    /// A station wants none. One that is flown, or that another partner is about to replace, is not
+    /// taken away.
     pub fn clear(&mut self, client: &mut Client<C>, address: [u8; 2], kind: Kind, put: Put<'_, C>) {
         let partner = Partner { client: client.id, address };
         let is_mission = matches!(kind, Kind::MAV_MISSION_TYPE_MISSION | Kind::MAV_MISSION_TYPE_ALL);

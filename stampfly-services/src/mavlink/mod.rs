@@ -14,7 +14,7 @@
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
 //! | `targets.rs` | set-points: a place to fly to, or how to move |
 //! | `leading.rs` | velocities, flown as a way-point that moves |
-//! | `unserved.rs` | what is not done, said aloud once in a while |
+//! | `unserved.rs` | messages that are refused aloud, once in a while |
 //! | `missions.rs` | the mission protocol |
 //! | `item.rs` | a mission item, and the [step](crate::mission::Step) that it means |
 //!

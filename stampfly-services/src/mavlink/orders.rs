@@ -1,8 +1,11 @@
 //! Commands that change the vehicle's state, each acknowledged when it is seen to have happened.
 //!
-//! A command that has reached the vehicle may still be refused by its mode machine, and what a program sends next depends on what the first has done. So the
-//! acknowledgement waits for the [state](crate::View::state) that the vehicle publishes, mostly one or two control cycles. Nothing is said meanwhile, because many
-//! programs take the first acknowledgement for the last one; whoever asks again while it is waited for is told that it goes on, and the vehicle is not asked twice.
+//! A command that has reached the vehicle may still be refused by its mode machine, and what a
+//! program sends next depends on what the first has done. So the acknowledgement waits for the
+//! [state](crate::View::state) that the vehicle publishes, mostly one or two control cycles.
+//! Nothing is said meanwhile, because many programs take the first acknowledgement for the last
+//! one; a program that asks again meanwhile is told that it goes on, and the vehicle is not asked
+//! twice.
 //!
 //! | asked for | has happened when |
 //! |---|---|
@@ -26,9 +29,11 @@ use stampfly_link::mavlink::dialects::common::{MavResult, MavSeverity};
 use stampfly_types::messages::{CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant, Vec3};
 
-/// Commands that are waited for at once. Whoever asks for more is told to try later, but for what ends a flight.
+/// Commands that are waited for at once. A program that asks for more is told to try later, unless
+/// it ends a flight.
 const AT_ONCE: usize = 3;
-/// A vehicle that has not done it after this long does not. Programs send a command again after half a second, and three times in all.
+/// A vehicle that has not done it after this long does not. Programs send a command again after
+/// half a second, and three times in all.
 const SOON: Duration = Duration::from_millis(1_500);
 /// No landing takes longer.
 const LANDING: Duration = Duration::from_secs(60);
@@ -50,7 +55,7 @@ pub(super) enum Deed {
     Return,
 }
 
-/// A line of the table: what is said when it is denied, what the vehicle is asked for, and when it has happened.
+/// A line of the table: the text of a denial, the command to the vehicle, and when it has happened.
 type Line = (&'static str, GuidedKind, fn(&FlightStatus) -> bool);
 
 impl Deed {
@@ -67,7 +72,7 @@ impl Deed {
         }
     }
 
-    /// What is said when it is denied.
+    /// The text of a denial.
     pub const fn denied(self) -> &'static str {
         self.line().0
     }
@@ -111,7 +116,8 @@ pub(super) fn take_off(height: f32) -> GuidedCommand {
     GuidedCommand { position: Vec3::new(0.0, 0.0, -height), ..Deed::TakeOff.command() }
 }
 
-/// Who asks, over which connection, by which system and component and with which number of a command.
+/// Who asks, over which connection, by which system and component and with which number of a
+/// command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Asked<C> {
     pub client: C,
@@ -140,12 +146,12 @@ pub(super) struct Orders<C> {
     all: Vec<Order<C>, AT_ONCE>,
 }
 
-/// What is known of one.
+/// How far one is.
 enum Fate {
     Waits,
     GoesOn,
     Done,
-    /// With what is said to people, if that is not said elsewhere.
+    /// With the reason for people, unless they are told it elsewhere.
     Denied(Option<&'static str>),
     Failed,
 }
@@ -169,7 +175,8 @@ impl<C: Copy + PartialEq> Orders<C> {
         self.all.iter().any(|order| order.asked.deed == Deed::Arm)
     }
 
-    /// Waits for it. The vehicle was asked, or will be as soon as it is armed, to rise to this height. `false` when there is no room.
+    /// Waits for it. The vehicle was asked, or will be as soon as it is armed, to rise to this
+    /// height. `false` when there is no room.
     pub fn wait(
         &mut self,
         now: Instant,
@@ -194,7 +201,7 @@ impl<C: Copy + PartialEq> Orders<C> {
         let is_arming = self.is_arming();
         self.all.retain_mut(|order| {
             let Asked { client, asker, number, deed } = order.asked;
-            // Nobody is left to be told.
+            // The program is gone.
             let Some(client) = clients.iter_mut().find(|known| known.id == client) else { return false };
             let fate = order.look(now, is_arming, cockpit, runner);
             let result = match fate {
@@ -276,7 +283,7 @@ pub(super) fn why_not(status: &FlightStatus) -> &'static str {
 #[inline(never)]
 pub(super) fn say<C>(client: &mut Client<C>, what: &str, why: &dyn fmt::Display, put: Put<'_, C>) {
     let mut sentence = String::<96>::new();
-    // What is too long is cut.
+    // A sentence that is too long is cut.
     _ = write!(sentence, "{what}: {why}");
     client.say(MavSeverity::MAV_SEVERITY_ERROR, &sentence, put);
 }

@@ -1,13 +1,14 @@
 //! Set-points: a place to fly to, or how to move.
 //!
-//! | message | what is flown |
+//! | message | the vehicle flies |
 //! |---|---|
 //! | `SET_POSITION_TARGET_LOCAL_NED` with a place | the place; velocities beside it are not needed |
 //! | with velocities | [the velocity](super::leading), with a height instead of the vertical one if there is one; heading or rate of turn |
 //! | with accelerations alone | nothing |
 //! | `SET_POSITION_TARGET_GLOBAL_INT` | the same, of a vehicle that knows where on Earth it is |
 //!
-//! What is not flown is said aloud. Not for attitudes: whoever flies those has to hear the vehicle within a hundredth of a second.
+//! Others are refused aloud. Attitudes are among them: a program that flies those has to hear the
+//! vehicle within a hundredth of a second.
 
 use super::commands::Turn;
 use super::leading::{Motion, NotLed};
@@ -31,7 +32,7 @@ const NO_YAW_RATE: Mask = Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE;
 /// No number of a velocity is beyond this, m/s, rad, rad/s, m.
 const FASTEST: f32 = 100.0;
 
-/// Flies what is wanted, or says why not.
+/// Flies a set-point, or says why not.
 pub(super) fn fly<C: Copy + PartialEq, const ITEMS: usize>(
     mut turn: Turn<'_, '_, C, ITEMS>,
     target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
@@ -104,7 +105,8 @@ const fn grounded(status: &FlightStatus) -> &'static str {
 }
 
 impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
-    /// Sends the vehicle to a place. Programs repeat the same target many times a second: only a new one is passed on.
+    /// Sends the vehicle to a place. Programs repeat the same target many times a second: only a
+    /// new one is passed on.
     fn go_to(&mut self, target: &SET_POSITION_TARGET_LOCAL_NED_DATA, estimate: &StateEstimate) {
         let asked = Vec3::new(target.x, target.y, target.z);
         let present = frame::yaw(&estimate.attitude);

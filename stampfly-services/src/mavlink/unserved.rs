@@ -1,6 +1,8 @@
-//! What this vehicle does not do with a message that has no acknowledgement: it is said aloud, so that nobody waits for it.
+//! Messages without an acknowledgement that this vehicle does not obey. A text says so, for
+//! programs would wait for ever.
 //!
-//! Programs send set-points and sticks many times a second: each client is told once in ten seconds of each.
+//! Programs send set-points and sticks many times a second: each client is told once in ten seconds
+//! of each.
 
 use super::client::{Client, Put};
 use core::fmt::{self, Write};
@@ -10,7 +12,7 @@ use stampfly_link::mavlink::dialects::common::MavSeverity;
 /// A kind is told again after this long, s.
 const AGAIN: u16 = 10;
 
-/// What is not done.
+/// A kind of message that is not obeyed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unserved {
     /// To fly to a place, or at a velocity.
@@ -70,7 +72,7 @@ impl<C> Client<C> {
             return;
         }
         let mut sentence = String::<96>::new();
-        // What is too long is cut.
+        // A sentence that is too long is cut.
         _ = write!(sentence, "{}: {why}", about.name());
         self.say(MavSeverity::MAV_SEVERITY_WARNING, &sentence, put);
     }

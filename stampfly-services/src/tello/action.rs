@@ -18,8 +18,9 @@ const AIMED: f32 = 0.06;
 const FOLLOWS: f32 = 0.5;
 /// Turns are flown in parts of at most a quarter: a heading alone does not say which way round.
 const QUARTER: f32 = core::f32::consts::FRAC_PI_2;
-/// What takes longer has failed. Programs wait seven seconds for most answers and twenty for a take-off; one that waits says nothing else, and is taken for gone
-/// after fifteen: it has to be answered before.
+/// What takes longer has failed. Programs wait seven seconds for most answers and twenty for a
+/// take-off; one that waits says nothing else, and is taken for gone after fifteen: it has to be
+/// answered before.
 const LONGEST: Duration = Duration::from_secs(14);
 /// A vehicle that has not armed after this long does not, and one that has not begun to turn over.
 const ARMS: Duration = Duration::from_millis(2_500);

@@ -408,7 +408,7 @@ fn a_command_and_an_item_of_another_dialect_are_answered() {
         let answer = scene.hear(1, frame);
         assert_eq!(answer[0], 0xFD);
         assert_eq!(answer[7..13], [77, 0, 0, 0xB8, 0xA5, MavResult::MAV_RESULT_UNSUPPORTED as u8]);
-        assert_eq!(answer[13..20], [0, 0, 0, 0, 0, 255, 190], "for whoever has asked");
+        assert_eq!(answer[13..20], [0, 0, 0, 0, 0, 255, 190], "for the station that has asked");
         // Not for this vehicle.
         payload[30] = 8;
         let frame =

@@ -29,7 +29,8 @@ impl Chance {
     }
 }
 
-/// What a line does to frames: how long a round trip takes, and how many of a hundred are lost, come twice, come late.
+/// What a line does to frames: how long a round trip takes, and how many of a hundred are lost,
+/// come twice, come late.
 #[derive(Clone, Copy)]
 struct Quality {
     round_trip: u64,
@@ -130,7 +131,8 @@ impl Line {
         arrived(&mut self.down, self.now).into_iter().map(|(_, message)| message).collect()
     }
 
-    /// A station uploads these, as honest stations do: it answers each question once, and says its last word again when nothing comes.
+    /// A station uploads these, as honest stations do: it answers each question once, and says its
+    /// last word again when nothing comes.
     fn uploads(&mut self, items: &[MISSION_ITEM_INT_DATA], mut beside: impl FnMut(&mut Self)) -> MavMissionResult {
         let count = MISSION_COUNT_DATA {
             count: items.len() as u16,
@@ -332,7 +334,7 @@ fn a_bad_line_costs_time_and_nothing_else() {
             let mut line = Line::new(Quality::bad(round_trip), seed);
             let items = items();
             assert_eq!(line.uploads(&items, |_| {}), ACCEPTED, "{round_trip} ms, seed {seed}");
-            // What is still on its way arrives.
+            // Frames that are still on their way arrive.
             for _ in 0..20_000 {
                 line.passes();
             }
@@ -371,7 +373,8 @@ fn the_last_word_said_again_is_answered_again_and_the_same_mission_keeps_its_num
     }
     assert_eq!(line.results(255), [(ACCEPTED, 1), (ACCEPTED, 1)]);
     assert_eq!(line.results(200), [(MavMissionResult::MAV_MISSION_ERROR, 0)]);
-    // The count of the upload that is over, come twice, begins nothing; one that is said later does.
+    // The count of the upload that is over, come twice, begins nothing; one that is said later
+    // does.
     let count = |count| {
         MavMessage::MISSION_COUNT(MISSION_COUNT_DATA {
             count,

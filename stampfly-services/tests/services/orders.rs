@@ -1,4 +1,5 @@
-//! Commands that change a vehicle's state are acknowledged when the vehicle shows that they have happened, to who has asked.
+//! Commands that change a vehicle's state are acknowledged when the vehicle shows that they have
+//! happened, to who has asked.
 #![allow(deprecated, reason = "older programs send what the protocol has superseded")]
 
 use crate::common::{Id, Vehicle};
@@ -143,7 +144,7 @@ fn what_the_mode_machine_refuses_is_denied_with_its_reasons_and_what_never_happe
 }
 
 #[test]
-fn that_nobody_is_heard_does_not_deny_arming_because_a_command_is_heard() {
+fn silence_does_not_deny_arming_because_the_command_ends_it() {
     let mut scene = Scene::new(Vehicle::standing());
     scene.vehicle.status(|status| status.blocks = ArmBlocks::NO_LINK);
     assert_eq!(scene.asks(STATION, ARM, ON), Said::default());
@@ -160,7 +161,8 @@ fn each_command_has_happened_when_the_vehicle_shows_it() {
     let landing: Change = |status| status.phase = P::Landing;
     let terminate = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
     let mode = MavCmd::MAV_CMD_DO_SET_MODE;
-    // What is asked of a vehicle in which state, what has not happened then, and what has.
+    // The command, its parameters, the state before, one in which it has not happened, and one in
+    // which it has.
     let table: [(MavCmd, [f32; 3], Change, Change, Change); 10] = [
         (ARM, ON, disarmed, disarmed, armed),
         (ARM, OFF, armed, armed, disarmed),
@@ -181,7 +183,7 @@ fn each_command_has_happened_when_the_vehicle_shows_it() {
         assert_eq!(scene.asks(STATION, kind, parameters), Said::default(), "{what}");
         assert_eq!(scene.shows(not_yet), Said::default(), "{what}");
         assert_eq!(scene.shows(then).results, [(kind, ACCEPTED, STATION)], "{what}");
-        // What is so already is acknowledged at once; a vehicle that stands does not return.
+        // A state that is there already is acknowledged at once.
         let again = scene.asks(STATION, kind, parameters).results();
         assert_eq!(again, [ACCEPTED], "{what}");
         assert_eq!(scene.passes(2_000), Said::default(), "{what}");
@@ -204,7 +206,8 @@ fn what_cannot_be_is_denied_at_once_and_people_are_told_why() {
     let current = denied(MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT, ON);
     assert_eq!(current, "not the current item: the mission has no such item");
     assert_eq!(scene.asked(), []);
-    // Standing with its motors off is what a landing ends with, and what a program's arming begins with.
+    // Standing with its motors off is what a landing ends with, and what a program's arming begins
+    // with.
     assert_eq!(scene.asks(STATION, MavCmd::MAV_CMD_NAV_LAND, OFF).results(), [ACCEPTED]);
     assert_eq!(scene.asks(STATION, MavCmd::MAV_CMD_DO_SET_MODE, [8.0, 0.0, 0.0]).results(), [ACCEPTED]);
 
@@ -296,7 +299,7 @@ fn there_is_room_for_three_and_always_for_what_ends_a_flight() {
     let said = scene.passes(20);
     let told: Vec<_> = said.results.iter().map(|(_, result, [_, component])| (*result, *component)).collect();
     assert_eq!(told, [(ACCEPTED, 0), (ACCEPTED, 1), (ACCEPTED, 2)]);
-    // Whoever is gone is told nothing.
+    // A program that is gone is told nothing.
     scene.vehicle.status(|status| status.armed = false);
     scene.asks(STATION, ARM, ON);
     scene.mavlink.close(1);

@@ -1,4 +1,5 @@
-//! Set-points, sticks and other messages without an acknowledgement: flown, answered, or refused aloud.
+//! Set-points, sticks and other messages without an acknowledgement: flown, answered, or refused
+//! aloud.
 #![allow(deprecated, reason = "programs send what the protocol has superseded")]
 
 use crate::common::{Id, Vehicle};
@@ -96,7 +97,7 @@ impl Scene {
         Instant::from_micros(2_500 * self.now)
     }
 
-    /// A station says something. Returns what is answered at once, but for texts.
+    /// A station says something. Returns the answers that come at once, but for texts.
     fn says(&mut self, message: &MavMessage) -> Vec<MavMessage> {
         let mut bytes = [0; LONGEST];
         let frame = MavlinkWriter::new(255, 190).write(MavlinkVersion::V2, message, &mut bytes);
@@ -287,7 +288,8 @@ fn what_is_not_flown_is_refused_aloud_once_in_a_while() {
         assert_eq!(scene.texts().len(), texts.len(), "again after ten seconds");
     }
     assert!(scene.vehicle.steered.is_empty());
-    // In a frame of another dialect. The mask, system, component and frame stand behind twelve numbers.
+    // In a frame of another dialect. The mask, system, component and frame stand behind twelve
+    // numbers.
     let mut payload = [0; 53];
     payload[48..53].copy_from_slice(&[0xC7, 0x0D, 7, 1, 99]);
     let mut bytes = [0; LONGEST];
@@ -300,7 +302,8 @@ fn what_is_not_flown_is_refused_aloud_once_in_a_while() {
     let others = SET_ATTITUDE_TARGET_DATA { target_system: 8, target_component, ..Default::default() };
     scene.passes(10_000, Some(&MavMessage::SET_ATTITUDE_TARGET(others)));
     assert_eq!(scene.texts(), [""; 0]);
-    // Nothing flies on the ground, and a vehicle of whose path nothing is known does not fly velocities.
+    // Nothing flies on the ground, and a vehicle of whose path nothing is known does not fly
+    // velocities.
     scene.vehicle.status(|status| status.phase = FlightPhase::Armed);
     scene.says(&velocity([1.0; 3]));
     assert_eq!(scene.texts(), ["set-point not flown: take off first"]);
@@ -345,7 +348,7 @@ fn a_ping_is_answered_a_log_is_not_there_and_a_mode_is_set() {
     let ping = PING_DATA { time_usec: 12_345, seq: 6, ..Default::default() };
     let answer = PING_DATA { target_system: 255, target_component: 190, ..ping.clone() };
     assert_eq!(scene.says(&MavMessage::PING(ping.clone())), [MavMessage::PING(answer.clone())]);
-    assert_eq!(scene.says(&MavMessage::PING(answer)), [], "an answer to somebody else");
+    assert_eq!(scene.says(&MavMessage::PING(answer)), [], "an answer to another program");
     let list = LOG_REQUEST_LIST_DATA { end: u16::MAX, target_system: 7, target_component: 1, ..Default::default() };
     assert_eq!(scene.says(&MavMessage::LOG_REQUEST_LIST(list)), [MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())]);
     let sync = TIMESYNC_DATA { ts1: 99, ..Default::default() };

@@ -207,7 +207,8 @@ impl Link for Services<'_> {
     }
 }
 
-/// A Tello's state goes to another port of the program's machine, and nowhere while that is closed: where answers are awaited it would be taken for one.
+/// A Tello's state goes to another port of the program's machine, and nowhere while that is closed:
+/// where answers are awaited it would be taken for one.
 fn destination(program: Client, what: Destination, state: Option<u16>) -> Option<Client> {
     match what {
         Destination::Program => Some(program),
