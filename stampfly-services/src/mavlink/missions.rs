@@ -60,7 +60,8 @@ struct Upload<C, const ITEMS: usize> {
     questions: u8,
     /// It is asked for again after this long.
     patience: Duration,
-    /// The last one that was seen: from the only question for an item until it came.
+    /// The shortest round trip that was seen, from the only question for an item until it came;
+    /// zero before the first.
     round_trip: Duration,
 }
 
@@ -69,8 +70,10 @@ impl<C, const ITEMS: usize> Upload<C, ITEMS> {
     /// round trip takes: another may be the answer to any of the questions.
     fn has_come(&mut self, now: Instant) {
         if self.questions == 1 {
-            self.round_trip = now.since(self.asked);
-            self.patience = (self.round_trip * 2).max(SOONEST).min(LATEST);
+            let round_trip = now.since(self.asked);
+            let is_shorter = self.round_trip == Duration::ZERO || round_trip < self.round_trip;
+            self.round_trip = if is_shorter { round_trip } else { self.round_trip };
+            self.patience = (round_trip * 2).max(SOONEST).min(LATEST);
         }
         (self.asked, self.questions) = (now, 1);
     }
@@ -170,11 +173,14 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         acknowledge(client, address, (refusal, request.mission_type, 0), put);
     }
 
-    /// Is this count the one of the upload that was accepted just now, come twice? What a station
-    /// says after it has heard that comes a round trip later.
+    /// Is this count the one of the upload that was accepted just now, come twice? A station that
+    /// begins another upload has read the acknowledgement before: that takes a round trip, and
+    /// half of the shortest is left for stations that read faster than they write.
     fn is_echo(&self, now: Instant, partner: &Partner<C>, count: u16) -> bool {
         let last = self.accepted.as_ref().filter(|_| self.upload.is_none());
-        last.is_some_and(|last| last.partner == *partner && last.count == count && now.since(last.at) < last.round_trip)
+        last.is_some_and(|last| {
+            last.partner == *partner && last.count == count && now.since(last.at) < last.round_trip / 2
+        })
     }
 
     /// Begins an upload, or says why not. Without items it is over at once.
