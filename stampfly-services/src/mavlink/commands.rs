@@ -10,7 +10,7 @@ use super::client::{Client, Put};
 use super::identity::Own;
 use super::leading::Leading;
 use super::missions::Missions;
-use super::orders::{Asked, Deed, Orders, say, take_off};
+use super::orders::{Asked, Deed, Orders, Rise, say, take_off};
 use super::streams::{STREAMS, make, text};
 use super::unserved::Unserved;
 use crate::cockpit::{Cockpit, Request};
@@ -26,12 +26,15 @@ pub(super) struct Command {
     kind: MavCmd,
     /// The first is number 1.
     parameters: [f32; 7],
+    /// It is sent again, because no acknowledgement has come.
+    is_repeated: bool,
 }
 
 impl From<&COMMAND_LONG_DATA> for Command {
     fn from(command: &COMMAND_LONG_DATA) -> Self {
         let COMMAND_LONG_DATA { param1, param2, param3, param4, param5, param6, param7, command: kind, .. } = *command;
-        Self { kind, parameters: [param1, param2, param3, param4, param5, param6, param7] }
+        let parameters = [param1, param2, param3, param4, param5, param6, param7];
+        Self { kind, parameters, is_repeated: command.confirmation > 0 }
     }
 }
 
@@ -41,7 +44,8 @@ impl From<&SET_MODE_DATA> for Command {
     fn from(mode: &SET_MODE_DATA) -> Self {
         let [_, _, main, sub] = mode.custom_mode.to_le_bytes().map(f32::from);
         let flags = f32::from(mode.base_mode.bits());
-        Self { kind: MavCmd::MAV_CMD_DO_SET_MODE, parameters: [flags, main, sub, 0.0, 0.0, 0.0, 0.0] }
+        let parameters = [flags, main, sub, 0.0, 0.0, 0.0, 0.0];
+        Self { kind: MavCmd::MAV_CMD_DO_SET_MODE, parameters, is_repeated: false }
     }
 }
 
@@ -53,7 +57,7 @@ impl From<&COMMAND_INT_DATA> for Command {
             MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION => [x as f32, y as f32],
             _ => [f32::NAN; 2],
         };
-        Self { kind, parameters: [param1, param2, param3, param4, x, y, z] }
+        Self { kind, parameters: [param1, param2, param3, param4, x, y, z], is_repeated: false }
     }
 }
 
@@ -121,8 +125,13 @@ pub(super) fn acknowledge<C>(
 impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     /// What becomes of a command. `None`: it is acknowledged when it has happened.
     fn outcome(&mut self, number: u16, command: &Command) -> Option<MavResult> {
-        let Command { kind, parameters: [p1, p2, p3, .., p7] } = command;
+        let Command { kind, parameters: [p1, p2, p3, .., p7], is_repeated } = command;
+        let status = self.cockpit.view().state();
+        // A mission may have begun since the acknowledgement that was lost: it is not ended.
+        let is_done = |deed: Deed| *is_repeated && deed.has_happened(&status);
         Some(match kind {
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 && is_done(Deed::Arm) => MavResult::MAV_RESULT_ACCEPTED,
+            MavCmd::MAV_CMD_NAV_TAKEOFF if is_done(Deed::TakeOff) => MavResult::MAV_RESULT_ACCEPTED,
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => return self.does(number, Deed::Arm, *p7),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
                 // 21196 says "whatever it does": motors off.
@@ -191,7 +200,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         let height = if height.is_finite() && height > 0.0 { height } else { self.own.identity.take_off_height };
         if deed == Deed::TakeOff && !status.armed && self.orders.is_arming() {
             // Sent together with the command to arm: it waits for that.
-            self.orders.wait(self.now, asked, self.seat, Some(height), self.cockpit);
+            self.orders.wait(self.now, asked, self.seat, Rise::Waits(height), self.cockpit);
             return None;
         }
         if deed == Deed::Arm && self.is_blocked(&status) {
@@ -206,7 +215,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             return Some(result(Err(refusal)));
         }
         let has_happened = deed.has_happened(&status);
-        let waits = !has_happened && self.orders.wait(self.now, asked, self.seat, None, self.cockpit);
+        let waits = !has_happened && self.orders.wait(self.now, asked, self.seat, Rise::Asked, self.cockpit);
         (!waits).then_some(MavResult::MAV_RESULT_ACCEPTED)
     }
 
@@ -240,6 +249,9 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                 self.missions.runner.halt();
                 self.leading.stop();
             }
+        }
+        if deed.ends_a_flight() {
+            self.orders.end();
         }
         Ok(())
     }

@@ -39,6 +39,8 @@ const SOON: Duration = Duration::from_millis(1_500);
 const LANDING: Duration = Duration::from_secs(60);
 /// Between two acknowledgements that it goes on.
 const AGAIN: Duration = Duration::from_millis(500);
+/// The vehicle's state says no more.
+const NOT_NOW: &str = "the vehicle does not do it now";
 /// How far it is, is not known.
 const UNKNOWN: u8 = u8::MAX;
 
@@ -126,13 +128,23 @@ pub(super) struct Asked<C> {
     pub deed: Deed,
 }
 
+/// Of a take-off: does it wait until the vehicle is armed?
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Rise {
+    /// The vehicle was asked.
+    Asked,
+    /// It will be asked to rise to this height, m.
+    Waits(f32),
+    /// Another command has ended it.
+    Void,
+}
+
 /// One that is waited for.
 #[derive(Clone, Copy, Debug)]
 struct Order<C> {
     asked: Asked<C>,
     seat: Seat,
-    /// A take-off to this height, of which the vehicle is asked as soon as it is armed.
-    rises_to: Option<f32>,
+    rise: Rise,
     since: Instant,
     /// How often it was told that it goes on.
     told: u8,
@@ -175,18 +187,17 @@ impl<C: Copy + PartialEq> Orders<C> {
         self.all.iter().any(|order| order.asked.deed == Deed::Arm)
     }
 
-    /// Waits for it. The vehicle was asked, or will be as soon as it is armed, to rise to this
-    /// height. `false` when there is no room.
-    pub fn wait(
-        &mut self,
-        now: Instant,
-        asked: Asked<C>,
-        seat: Seat,
-        rises_to: Option<f32>,
-        cockpit: &dyn Cockpit,
-    ) -> bool {
+    /// A command has come that ends flights: one that has not begun does not begin.
+    pub fn end(&mut self) {
+        for order in self.all.iter_mut().filter(|order| matches!(order.rise, Rise::Waits(_))) {
+            order.rise = Rise::Void;
+        }
+    }
+
+    /// Waits for it. `false` when there is no room.
+    pub fn wait(&mut self, now: Instant, asked: Asked<C>, seat: Seat, rise: Rise, cockpit: &dyn Cockpit) -> bool {
         let refused = refusals(cockpit);
-        self.all.push(Order { asked, seat, rises_to, since: now, told: 0, refused }).is_ok()
+        self.all.push(Order { asked, seat, rise, since: now, told: 0, refused }).is_ok()
     }
 
     /// Looks what has happened, and acknowledges it. Call it about fifty times a second.
@@ -213,7 +224,9 @@ impl<C: Copy + PartialEq> Orders<C> {
                     MavResult::MAV_RESULT_DENIED
                 }
                 Fate::Failed => {
-                    say(client, deed.denied(), &why_not(&cockpit.view().state()), put);
+                    let status = cockpit.view().state();
+                    let why = if deed == Deed::Arm { NOT_NOW } else { why_not(&status) };
+                    say(client, deed.denied(), &why, put);
                     MavResult::MAV_RESULT_FAILED
                 }
             };
@@ -228,11 +241,12 @@ impl<C> Order<C> {
     fn look(&mut self, now: Instant, is_arming: bool, cockpit: &mut dyn Cockpit, runner: &mut Runner) -> Fate {
         let (status, deed) = (cockpit.view().state(), self.asked.deed);
         let waited = now.since(self.since);
-        if let Some(height) = self.rises_to {
-            if status.armed {
-                return self.rise(now, height, cockpit, runner);
-            }
-            return if is_arming { Fate::Waits } else { Fate::Denied(Some("motors are off")) };
+        match self.rise {
+            Rise::Asked => {}
+            Rise::Waits(height) if status.armed => return self.rise(now, height, cockpit, runner),
+            Rise::Waits(_) if is_arming => return Fate::Waits,
+            Rise::Waits(_) => return Fate::Denied(Some("motors are off")),
+            Rise::Void => return Fate::Denied(Some("another command has ended it")),
         }
         if deed.has_happened(&status) {
             return Fate::Done;
@@ -258,7 +272,7 @@ impl<C> Order<C> {
             return Fate::Denied(Some("the vehicle takes no command"));
         }
         runner.halt();
-        (self.rises_to, self.since) = (None, now);
+        (self.rise, self.since) = (Rise::Asked, now);
         Fate::Waits
     }
 }
@@ -274,7 +288,7 @@ pub(super) fn why_not(status: &FlightStatus) -> &'static str {
         FlightStatus { phase: FlightPhase::Landing, .. } => "it lands",
         FlightStatus { commander: CommandSource::Pilot, .. } => "a pilot flies",
         FlightStatus { commander: CommandSource::Failsafe, .. } => "the failsafe flies",
-        _ => "the vehicle does not do it now",
+        _ => NOT_NOW,
     }
 }
 

@@ -140,7 +140,7 @@ fn what_the_mode_machine_refuses_is_denied_with_its_reasons_and_what_never_happe
     scene.asks(STATION, ARM, ON);
     assert_eq!(scene.passes(1_480), Said::default());
     let said = scene.passes(40);
-    assert_eq!((said.results(), &said.texts[0][..]), (vec![FAILED], "arming denied: motors are off"));
+    assert_eq!((said.results(), &said.texts[0][..]), (vec![FAILED], "arming denied: the vehicle does not do it now"));
 }
 
 #[test]
@@ -235,6 +235,13 @@ fn what_is_sent_again_while_it_is_waited_for_is_done_once() {
     }
     assert_eq!(scene.asked(), [GuidedKind::Arm]);
     assert_eq!(scene.shows(armed).results, [(ARM, ACCEPTED, STATION)], "one acknowledgement");
+    // The acknowledgement was lost.
+    scene.asked();
+    let said = scene.sends(STATION, COMMAND_LONG_DATA { confirmation: 3, ..arm });
+    assert_eq!((said.results(), scene.asked()), (vec![ACCEPTED], vec![]));
+    scene.vehicle.status(|status| status.phase = FlightPhase::TakeOff);
+    let take_off = COMMAND_LONG_DATA { command: TAKE_OFF, confirmation: 1, ..to_it() };
+    assert_eq!((scene.sends(STATION, take_off).results(), scene.asked()), (vec![ACCEPTED], vec![]));
     // Motors off may have been lost on its way, and twice is once.
     scene.asks(STATION, ARM, KILL);
     scene.asks(STATION, ARM, KILL);
@@ -252,6 +259,15 @@ fn a_take_off_sent_together_with_arming_waits_for_it() {
     assert_eq!(scene.vehicle.guided.last().map(|command| command.position.z), Some(-0.8));
     let rises = scene.shows(|status| status.phase = FlightPhase::TakeOff);
     assert_eq!(rises.results, [(TAKE_OFF, ACCEPTED, STATION)]);
+
+    // Motors off: the take-off that has waited does not come after it.
+    let mut scene = Scene::new(Vehicle::standing());
+    scene.asks(STATION, ARM, ON);
+    scene.asks(STATION, TAKE_OFF, OFF);
+    scene.asks([200, 190], ARM, KILL);
+    let said = scene.shows(armed);
+    assert_eq!(scene.asked(), [GuidedKind::Arm, GuidedKind::Kill]);
+    assert_eq!(said.texts, ["take-off denied: another command has ended it"]);
 
     let mut scene = Scene::new(Vehicle::standing());
     scene.asks(STATION, ARM, ON);
