@@ -87,6 +87,18 @@ class Vehicle:
 
         self.wait_until(f"at {north:.1f} m north, {east:.1f} m east, {up:.1f} m up", "LOCAL_POSITION_NED", is_there, 15)
 
+    def fly_at(self, north, east, seconds):
+        """Flies at a velocity, which is said ten times a second, and returns how far it has come."""
+        only_velocity = 0b110111000111
+        send = self.line.mav.set_position_target_local_ned_send
+        begin = self.receive("LOCAL_POSITION_NED", 2)
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            send(0, self.line.target_system, 1, mavlink.MAV_FRAME_LOCAL_NED, only_velocity, 0, 0, 0, north, east, *[0] * 6)
+            self.receive("HEARTBEAT", 0.1)
+        end = self.receive("LOCAL_POSITION_NED", 2)
+        return end.x - begin.x, end.y - begin.y
+
 
 def main():
     vehicle = Vehicle(sys.argv[1])
@@ -105,9 +117,10 @@ def main():
     while vehicle.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1) != mavlink.MAV_RESULT_ACCEPTED:
         assert time.monotonic() < until, "it does not arm"
         time.sleep(1)
+    # An acknowledgement means that it has happened: the next command needs no pause.
+    assert vehicle.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, HEIGHT) == mavlink.MAV_RESULT_ACCEPTED
     armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     vehicle.wait_until("armed", "HEARTBEAT", lambda beat: beat.base_mode & armed, 5)
-    assert vehicle.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, HEIGHT) == mavlink.MAV_RESULT_ACCEPTED
     in_air = mavlink.MAV_LANDED_STATE_IN_AIR
     vehicle.wait_until("in the air", "EXTENDED_SYS_STATE", lambda state: state.landed_state == in_air, 10)
     assert abs(vehicle.set_parameter("rate.roll.kp", 1.2 * gain) / gain - 1.2) < 1e-5, "a gain changes in flight"
@@ -118,6 +131,13 @@ def main():
 
     for north, east in [(SIDE, 0), (SIDE, SIDE), (0, SIDE), (0, 0)]:
         vehicle.go_to(north, east, HEIGHT)
+
+    north, east = vehicle.fly_at(0.3, -0.2, 3)
+    print(f"came {north:.2f} m north and {-east:.2f} m west in three seconds")
+    assert abs(north - 0.8) < 0.25 and abs(east + 0.5) < 0.25, (north, east)
+    vehicle.line.mav.log_request_list_send(vehicle.line.target_system, 1, 0, 0xFFFF)
+    logs = vehicle.receive("LOG_ENTRY", 2)
+    assert logs is not None and logs.num_logs == 0, logs
 
     assert vehicle.command(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
     vehicle.wait_until("landed and disarmed", "HEARTBEAT", lambda beat: not beat.base_mode & armed, 20)

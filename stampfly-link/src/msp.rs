@@ -120,17 +120,17 @@ impl Outline {
         Some(MspFrame { version, direction, flag, id, payload: bytes.get(start..end)? })
     }
 
-    /// Reads the frame that begins at the first byte.
-    fn parse(bytes: &[u8]) -> Parsed {
+    /// Reads the beginning of a frame up to its payload.
+    fn begin(bytes: &[u8]) -> Result<Self, Parsed> {
         let version = match bytes {
-            [] => return Parsed::Incomplete(1),
-            [START] => return Parsed::Incomplete(2),
+            [] => return Err(Parsed::Incomplete(1)),
+            [START] => return Err(Parsed::Incomplete(2)),
             [START, VERSION_1, ..] => Version::One,
             [START, VERSION_2, ..] => Version::Two,
-            _ => return Parsed::Nothing,
+            _ => return Err(Parsed::Nothing),
         };
-        let Some(direction) = bytes.get(2) else { return Parsed::Incomplete(PREAMBLE) };
-        let Some(direction) = Direction::of(*direction) else { return Parsed::Nothing };
+        let Some(direction) = bytes.get(2) else { return Err(Parsed::Incomplete(PREAMBLE)) };
+        let Some(direction) = Direction::of(*direction) else { return Err(Parsed::Nothing) };
         let rest = bytes.get(PREAMBLE..).unwrap_or_default();
         let (flag, id, length, header) = match (version, rest) {
             (Version::One, [JUMBO, id, l0, l1, ..]) => (0, u16::from(*id), u16::from_le_bytes([*l0, *l1]), 4),
@@ -138,18 +138,28 @@ impl Outline {
             (Version::Two, [flag, i0, i1, l0, l1, ..]) => {
                 (*flag, u16::from_le_bytes([*i0, *i1]), u16::from_le_bytes([*l0, *l1]), 5)
             }
-            (Version::One, [JUMBO, ..]) => return Parsed::Incomplete(PREAMBLE + 4),
-            (Version::One, _) => return Parsed::Incomplete(PREAMBLE + 2),
-            (Version::Two, _) => return Parsed::Incomplete(PREAMBLE + 5),
+            (Version::One, [JUMBO, ..]) => return Err(Parsed::Incomplete(PREAMBLE + 4)),
+            (Version::One, _) => return Err(Parsed::Incomplete(PREAMBLE + 2)),
+            (Version::Two, _) => return Err(Parsed::Incomplete(PREAMBLE + 5)),
         };
-        let end = header + usize::from(length);
-        let (Some(checked), Some(last)) = (rest.get(..end), rest.get(end)) else {
-            return Parsed::Incomplete(PREAMBLE + end + 1);
+        let start = PREAMBLE + header;
+        Ok(Self { version, direction, flag, id, payload: (start, start + usize::from(length)) })
+    }
+
+    /// Reads the frame that begins at the first byte.
+    fn parse(bytes: &[u8]) -> Parsed {
+        let outline = match Self::begin(bytes) {
+            Ok(outline) => outline,
+            Err(parsed) => return parsed,
         };
-        if version.check(checked) != *last {
+        let (_, end) = outline.payload;
+        let (Some(checked), Some(last)) = (bytes.get(PREAMBLE..end), bytes.get(end)) else {
+            return Parsed::Incomplete(outline.size());
+        };
+        if outline.version.check(checked) != *last {
             return Parsed::Nothing;
         }
-        Parsed::Frame(Self { version, direction, flag, id, payload: (PREAMBLE + header, PREAMBLE + end) })
+        Parsed::Frame(outline)
     }
 }
 
@@ -197,12 +207,33 @@ impl Version {
             Self::Two => crc8(bytes),
         }
     }
+
+    /// The same of bytes whose check is `before`, and one more.
+    fn check_on(self, before: u8, byte: u8) -> u8 {
+        match self {
+            Self::One => before ^ byte,
+            Self::Two => crc8(&[before ^ byte]),
+        }
+    }
+}
+
+/// A frame that there is no room for, while it passes.
+#[derive(Clone, Copy, Debug)]
+struct Passing {
+    /// Without its payload.
+    frame: MspFrame<'static>,
+    /// Bytes that are still to come, the last included.
+    left: usize,
+    /// Of those that have come.
+    check: u8,
 }
 
 /// Finds frames in what a port hands over; `N` bytes are the longest frame that it can take.
 ///
-/// 64 are enough for what a small flight controller is asked, 262 for every frame of version 1 that is not "jumbo". A longer one is passed over. A
-/// frame that is cut short costs itself alone: the next one is found in what seemed to be the rest of it, as soon as enough bytes
+/// 64 are enough for what a small flight controller is asked, 262 for every frame of version 1 that
+/// is not "jumbo". A longer one is passed over, and [`too_long`](Self::too_long) says which it was.
+/// A frame that is cut short costs itself alone: the next one is found in what seemed to be the
+/// rest of it, as soon as enough bytes
 /// have come to show that it is not. For a byte that shows it, the work grows with `N`²; for others it does not depend on `N`.
 #[derive(Clone, Debug)]
 pub struct MspDecoder<const N: usize> {
@@ -211,6 +242,7 @@ pub struct MspDecoder<const N: usize> {
     need: usize,
     /// Bytes of the frame that was returned last.
     taken: usize,
+    passing: Option<Passing>,
 }
 
 impl<const N: usize> Default for MspDecoder<N> {
@@ -223,7 +255,7 @@ impl<const N: usize> MspDecoder<N> {
     /// Has heard nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { heard: Heard::new(), need: 0, taken: 0 }
+        Self { heard: Heard::new(), need: 0, taken: 0, passing: None }
     }
 
     /// Bytes so far that were part of no frame. Wraps around.
@@ -238,12 +270,62 @@ impl<const N: usize> MspDecoder<N> {
         self.forget();
         self.heard.discard(self.heard.len());
         self.need = 0;
+        self.passing = None;
+    }
+
+    /// The frame that the last byte has ended and that there was no room for, without its payload;
+    /// once. What its payload looks like is taken for frames all the same. Ask after a
+    /// [`feed`](Self::feed) that returned none: a configurator waits for an answer.
+    ///
+    /// ```
+    /// use stampfly_link::msp::{MspDecoder, MspFrame}; let (mut decoder, mut long) =
+    /// (MspDecoder::<64>::new(), [0; 128]); let length = MspFrame { payload: &[7; 100],
+    /// ..MspFrame::request(200) }.write(&mut long).unwrap_or(0); let ids: Vec<_> = long[..length]
+    ///     .iter()
+    ///     .filter_map(|byte| match decoder.feed(*byte) {
+    ///         Some(frame) => Some(frame.id),
+    ///         None => decoder.too_long().map(|frame| frame.id),
+    ///     })
+    ///     .collect();
+    /// assert_eq!(ids, [200]);
+    /// ```
+    pub fn too_long(&mut self) -> Option<MspFrame<'static>> {
+        let ended = self.passing.take_if(|passing| passing.left == 0);
+        ended.filter(|passing| passing.check == 0).map(|passing| passing.frame)
+    }
+
+    /// One more byte of a frame that there is no room for. The last makes its check zero, if it is
+    /// sound.
+    #[inline]
+    fn pass(&mut self, byte: u8) {
+        let Some(passing) = &mut self.passing else { return };
+        if passing.left == 0 {
+            self.passing = None;
+            return;
+        }
+        passing.left -= 1;
+        passing.check = match passing.left {
+            0 => passing.check ^ byte,
+            _ => passing.frame.version.check_on(passing.check, byte),
+        };
+    }
+
+    /// What begins here is a frame that there is no room for.
+    #[cold]
+    fn begin_passing(&mut self) {
+        let bytes = self.heard.bytes();
+        let (Ok(outline), Some(checked)) = (Outline::begin(bytes), bytes.get(PREAMBLE..)) else { return };
+        let Outline { version, direction, flag, id, .. } = outline;
+        let frame = MspFrame { version, direction, flag, id, payload: &[] };
+        let left = outline.size().saturating_sub(bytes.len());
+        self.passing = Some(Passing { frame, left, check: version.check(checked) });
     }
 
     /// Takes a byte. Returns the frame that it ends.
     #[inline]
     pub fn feed(&mut self, byte: u8) -> Option<MspFrame<'_>> {
         self.forget();
+        self.pass(byte);
         if self.heard.is_full() {
             // Longer than there is room for.
             self.discard();
@@ -265,6 +347,9 @@ impl<const N: usize> MspDecoder<N> {
             match Outline::parse(self.heard.bytes()) {
                 Parsed::Incomplete(need) => {
                     self.need = need;
+                    if need > N && self.passing.is_none() {
+                        self.begin_passing();
+                    }
                     return None;
                 }
                 Parsed::Nothing => self.discard(),

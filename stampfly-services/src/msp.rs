@@ -195,19 +195,29 @@ impl Msp {
             self.decoder.silence();
         }
         self.heard = now;
+        let card = self.card;
         for byte in bytes {
-            let Some(asked) = self.decoder.feed(*byte).filter(|frame| frame.direction == Direction::Request) else {
-                continue;
-            };
-            let payload = answer(now, self.card, &asked, cockpit);
-            let direction = if payload.is_some() { Direction::Reply } else { Direction::Error };
-            let payload = payload.unwrap_or(Payload::new()).0;
-            let mut out = [0; PAYLOAD + 16];
-            let length = asked.answer(direction, &payload).write(&mut out);
-            if let Some(frame) = length.and_then(|length| out.get(..length)) {
-                put(frame);
+            match self.decoder.feed(*byte) {
+                Some(asked) if asked.direction != Direction::Request => {}
+                Some(asked) => say(&asked, answer(now, card, &asked, cockpit), put),
+                // One that there is no room for is none that is known here.
+                None => {
+                    let asked = self.decoder.too_long().filter(|frame| frame.direction == Direction::Request);
+                    asked.into_iter().for_each(|asked| say(&asked, None, put));
+                }
             }
         }
+    }
+}
+
+/// Answers a question. With nothing it is an error.
+fn say(asked: &MspFrame<'_>, payload: Option<Payload>, put: &mut dyn FnMut(&[u8])) {
+    let direction = if payload.is_some() { Direction::Reply } else { Direction::Error };
+    let payload = payload.unwrap_or(Payload::new()).0;
+    let mut out = [0; PAYLOAD + 16];
+    let length = asked.answer(direction, &payload).write(&mut out);
+    if let Some(frame) = length.and_then(|length| out.get(..length)) {
+        put(frame);
     }
 }
 

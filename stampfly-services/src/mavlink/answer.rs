@@ -1,18 +1,19 @@
 //! Which message goes where.
 
-use super::commands::{self, Turn};
+use super::commands::{self, NO_ITEM, Turn};
 use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
+use super::orders::say;
 use super::unreadable::Unreadable;
-use super::{parameters, streams};
-use stampfly_link::mavlink::dialects::common::{MavMissionType, TIMESYNC_DATA};
+use super::unserved::Unserved;
+use super::{parameters, streams, targets};
+use stampfly_link::mavlink::dialects::common::{LOG_ENTRY_DATA, MavMissionType, PING_DATA, TIMESYNC_DATA};
 use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
-/// Answers one message of a client's system. Returns where on Earth the vehicle is, if it was told.
+/// Answers one message. Returns where on Earth the vehicle is, if it was told.
 pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
     turn: Turn<'_, '_, C, ITEMS>,
-    system: u8,
     message: &Heard,
 ) -> Option<Origin> {
     let (now, own, seat) = (turn.now, turn.own, turn.seat);
@@ -25,7 +26,21 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
             commands::obey(turn, &commands::Command::from(command));
         }
         Heard::SetPositionTargetLocalNed(target) if own.is_meant(target.target_system, target.target_component) => {
-            commands::go_to(turn, target);
+            targets::fly(turn, target);
+        }
+        Heard::SetPositionTargetGlobalInt(target) if own.is_meant(target.target_system, target.target_component) => {
+            targets::fly_on_earth(turn, target);
+        }
+        Heard::SetAttitudeTarget(target) if own.is_meant(target.target_system, target.target_component) => {
+            turn.client.complain(Unserved::Attitude, &"send places or velocities", turn.put);
+        }
+        Heard::SetMode(mode) if own.is_meant(mode.target_system, AUTOPILOT) => {
+            commands::obey(turn, &commands::Command::from(mode));
+        }
+        // Which channel is which stick, and which of its ends is forward, is a matter of each
+        // transmitter.
+        Heard::RcChannelsOverride(channels) if own.is_meant(channels.target_system, channels.target_component) => {
+            turn.client.complain(Unserved::Override, &"send MANUAL_CONTROL", turn.put);
         }
         Heard::ManualControl(sticks) if own.is_meant(sticks.target, AUTOPILOT) => {
             let share = |axis: i16| if axis == i16::MAX { 0.0 } else { f32::from(axis) / 1000.0 };
@@ -39,16 +54,18 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
                 arm: turn.cockpit.view().state().armed,
                 kill: false,
             };
-            _ = turn.cockpit.steer(now, seat, &input.cleaned());
+            if let Err(refusal) = turn.cockpit.steer(now, seat, &input.cleaned()) {
+                turn.client.complain(Unserved::Sticks, &refusal, turn.put);
+            }
         }
         Heard::ParamRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
             turn.client.next_parameter = Some(0);
         }
         Heard::ParamRequestRead(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::read(turn.client, request, turn.cockpit.parameters(), turn.put);
+            parameters::read(turn.client, request, turn.asker, turn.cockpit.parameters(), turn.put);
         }
         Heard::ParamSet(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::set(turn.client, request, turn.cockpit, turn.put);
+            parameters::set(turn.client, request, turn.asker, turn.cockpit, turn.put);
         }
         Heard::SetGpsGlobalOrigin(request) if own.is_meant(request.target_system, AUTOPILOT) => {
             return set_origin(
@@ -56,47 +73,67 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
                 Origin { latitude: request.latitude, longitude: request.longitude, altitude: request.altitude },
             );
         }
-        Heard::Timesync(sync) if sync.tc1 == 0 => {
-            let answer = TIMESYNC_DATA { tc1: (now.as_micros() as i64).saturating_mul(1000), ..sync.clone() };
+        // A record of flights is not kept where MAVLink could read it.
+        Heard::LogRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
+            turn.client.send(&LOG_ENTRY_DATA::default().into(), turn.put);
+        }
+        // With an addressee it is an answer.
+        Heard::Ping(ping) if ping.target_system == 0 && ping.target_component == 0 => {
+            let [target_system, target_component] = turn.asker;
+            turn.client.send(&PING_DATA { target_system, target_component, ..ping.clone() }.into(), turn.put);
+        }
+        Heard::Timesync(sync) if sync.tc1 == 0 && own.is_meant(sync.target_system, sync.target_component) => {
+            let [target_system, target_component] = turn.asker;
+            let tc1 = (now.as_micros() as i64).saturating_mul(1000);
+            let answer = TIMESYNC_DATA { tc1, ts1: sync.ts1, target_system, target_component };
             turn.client.send(&answer.into(), turn.put);
         }
-        _ => mission(turn, system, message),
+        _ => mission(turn, message),
     }
     None
 }
 
 /// The messages of the mission protocol.
-fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, system: u8, message: &Heard) {
-    let Turn { now, own, client, missions, put, .. } = turn;
+fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, message: &Heard) {
+    let Turn { now, own, asker, client, missions, put, .. } = turn;
     match message {
         Heard::MissionCount(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.count(now, client, system, request, put);
+            missions.count(now, client, asker, request, put);
         }
         Heard::MissionItemInt(item) if own.is_meant(item.target_system, item.target_component) => {
-            missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
+            missions.item(now, client, own, asker, (item.seq, item.mission_type, Some(item.into())), put);
         }
         Heard::MissionItem(item) if own.is_meant(item.target_system, item.target_component) => {
-            missions.item(now, client, own, system, (item.seq, item.mission_type, Some(item.into())), put);
+            missions.item(now, client, own, asker, (item.seq, item.mission_type, Some(item.into())), put);
         }
         Heard::MissionRequestList(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.list(client, system, request.mission_type, put);
+            missions.list(client, asker, request.mission_type, put);
         }
         Heard::MissionRequestInt(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.request(client, system, (request.seq, request.mission_type), put);
+            missions.request(client, asker, (request.seq, request.mission_type), put);
         }
         // Older programs ask so, and read both kinds of item.
         Heard::MissionRequest(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.request(client, system, (request.seq, request.mission_type), put);
+            missions.request(client, asker, (request.seq, request.mission_type), put);
         }
         Heard::MissionClearAll(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.clear(client, system, request.mission_type, put);
+            missions.clear(client, asker, request.mission_type, put);
         }
         Heard::MissionSetCurrent(request) if own.is_meant(request.target_system, request.target_component) => {
-            missions.set_current(usize::from(request.seq));
+            if !missions.set_current(usize::from(request.seq)) {
+                say(client, "not the current item", &NO_ITEM, put);
+            }
             client.send(&missions.state(), put);
         }
+        // Parts of a mission are not exchanged.
+        Heard::MissionWritePartialList(request) if own.is_meant(request.target_system, request.target_component) => {
+            missions.refuse(client, asker, request.mission_type, put);
+        }
+        Heard::MissionRequestPartialList(request) if own.is_meant(request.target_system, request.target_component) => {
+            missions.refuse(client, asker, request.mission_type, put);
+        }
         Heard::MissionAck(ack) if own.is_meant(ack.target_system, ack.target_component) => {
-            missions.acknowledged(client, ack);
+            missions.acknowledged(client, asker, ack);
         }
         _ => {}
     }
@@ -124,20 +161,19 @@ fn set_origin<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITE
 }
 
 /// What cannot be read is answered so that nobody waits for it.
-pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(
-    turn: Turn<'_, '_, C, ITEMS>,
-    system: u8,
-    message: Unreadable,
-) {
+pub(super) fn unreadable<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, message: Unreadable) {
     let own = turn.own;
     match message {
         Unreadable::Heartbeat => sign_of_life(turn),
         Unreadable::Command { number, target: [to, component] } if own.is_meant(to, component) => {
-            commands::refuse(turn.client, number, turn.put);
+            commands::refuse(turn.client, number, turn.asker, turn.put);
+        }
+        Unreadable::Target { target: [to, component] } if own.is_meant(to, component) => {
+            turn.client.complain(Unserved::Target, &"not in this frame", turn.put);
         }
         Unreadable::Item { sequence, kind: 0, target: [to, component] } if own.is_meant(to, component) => {
             let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
-            turn.missions.item(turn.now, turn.client, own, system, (sequence, kind, None), turn.put);
+            turn.missions.item(turn.now, turn.client, own, turn.asker, (sequence, kind, None), turn.put);
         }
         _ => {}
     }

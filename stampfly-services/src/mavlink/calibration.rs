@@ -18,12 +18,13 @@
 //! for PX4 alone: for a generic autopilot it has no page for sensors, so there they are texts for people, and the command comes from its console or another station.
 
 use super::client::{Client, Put};
+use super::commands;
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::Refusal;
 use core::fmt::Write;
 use heapless::String;
 use stampfly_flight::console::calibrate::{self, News};
-use stampfly_link::mavlink::dialects::common::{COMMAND_ACK_DATA, MavCmd, MavResult, MavSeverity};
+use stampfly_link::mavlink::dialects::common::{MavCmd, MavResult, MavSeverity};
 use stampfly_types::messages::{CalibrationKind, CalibrationReport, CalibrationStage};
 use stampfly_types::{Duration, Instant};
 
@@ -91,6 +92,8 @@ const fn name(kind: CalibrationKind) -> &'static str {
 #[derive(Clone, Copy, Debug)]
 struct Asked<C> {
     client: C,
+    /// System and component.
+    asker: [u8; 2],
     kind: CalibrationKind,
     at: Instant,
     /// When it was last acknowledged.
@@ -107,9 +110,9 @@ pub(super) struct Calibrating<C> {
     news: News,
 }
 
-fn acknowledge<C>(client: &mut Client<C>, result: MavResult, progress: u8, put: Put<'_, C>) {
-    let command = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION;
-    client.send(&COMMAND_ACK_DATA { command, result, progress, ..Default::default() }.into(), put);
+fn acknowledge<C>(client: &mut Client<C>, asker: [u8; 2], result: MavResult, progress: u8, put: Put<'_, C>) {
+    let number = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
+    commands::acknowledge(client, number, asker, (result, progress), put);
 }
 
 /// Says something to people, and to programs that read what PX4 says.
@@ -141,6 +144,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
         &mut self,
         now: Instant,
         client: &mut Client<C>,
+        asker: [u8; 2],
         parameters: &[f32; 7],
         cockpit: &mut dyn Cockpit,
         put: Put<'_, C>,
@@ -163,8 +167,8 @@ impl<C: Copy + PartialEq> Calibrating<C> {
         match &mut self.asked {
             // It was asked again, because the acknowledgement was lost.
             Some(asked) if asked.client == client.id && asked.kind == kind => {
-                asked.told = now;
-                acknowledge(client, MavResult::MAV_RESULT_IN_PROGRESS, asked.progress, put);
+                (asked.told, asked.asker) = (now, asker);
+                acknowledge(client, asker, MavResult::MAV_RESULT_IN_PROGRESS, asked.progress, put);
                 return Ok(());
             }
             Some(asked) if asked.client != client.id => return Err(MavResult::MAV_RESULT_TEMPORARILY_REJECTED),
@@ -174,9 +178,10 @@ impl<C: Copy + PartialEq> Calibrating<C> {
             say(client, format_args!("calibration failed: {refusal}"), put);
             return Err(refused(refusal));
         }
-        self.asked = Some(Asked { client: client.id, kind, at: now, told: now, progress: UNKNOWN, has_begun: false });
+        let (id, progress) = (client.id, UNKNOWN);
+        self.asked = Some(Asked { client: id, asker, kind, at: now, told: now, progress, has_begun: false });
         self.news = News::NOTHING;
-        acknowledge(client, MavResult::MAV_RESULT_IN_PROGRESS, UNKNOWN, put);
+        acknowledge(client, asker, MavResult::MAV_RESULT_IN_PROGRESS, UNKNOWN, put);
         say(client, format_args!("calibration started: 2 {}", name(kind)), put);
         say(client, format_args!("{}", calibrate::instructions(kind)), put);
         Ok(())
@@ -195,7 +200,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
         let Some(report) = report else {
             if !asked.has_begun && now.since(asked.at) >= BEGINS {
                 say(client, format_args!("calibration failed: it does not begin"), put);
-                acknowledge(client, MavResult::MAV_RESULT_FAILED, 0, put);
+                acknowledge(client, asked.asker, MavResult::MAV_RESULT_FAILED, 0, put);
                 *waiting = None;
             }
             return;
@@ -213,7 +218,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
                 }
                 if is_new || now.since(asked.told) >= AGAIN {
                     (asked.progress, asked.told) = (progress, now);
-                    acknowledge(client, MavResult::MAV_RESULT_IN_PROGRESS, progress, put);
+                    acknowledge(client, asked.asker, MavResult::MAV_RESULT_IN_PROGRESS, progress, put);
                 }
                 return;
             }
@@ -237,7 +242,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
                 say(client, format_args!("calibration failed: {}", name(asked.kind)), put);
             }
         }
-        acknowledge(client, result, 100, put);
+        acknowledge(client, asked.asker, result, 100, put);
         *waiting = None;
     }
 }

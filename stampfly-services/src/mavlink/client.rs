@@ -5,6 +5,7 @@ use super::identity::{AUTOPILOT, Own};
 use super::said::Said;
 use super::streams::STREAMS;
 use super::unreadable::Unreadable;
+use super::unserved::Told;
 use crate::view::View;
 use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity, STATUSTEXT_DATA};
 use stampfly_link::mavlink::signing::{Signer, SigningKey, Untrusted, Verifier};
@@ -29,10 +30,11 @@ pub(super) struct Due {
 
 /// What a byte has ended.
 pub(super) enum Fed {
-    /// A message of this system that is for a vehicle.
-    Message(u8, Heard),
-    /// A message of this system that the dialect cannot read, but that wants an answer.
-    Unreadable(u8, Unreadable),
+    /// A message of this system and component that is for a vehicle.
+    Message([u8; 2], Heard),
+    /// A message of this system and component that the dialect cannot read, but that wants an
+    /// answer.
+    Unreadable([u8; 2], Unreadable),
     /// Bytes of another protocol, of this system.
     Tunnel(u8, Tunnel),
     /// A frame that is not signed as it must be.
@@ -68,6 +70,8 @@ pub(super) struct Client<C> {
     pub due: [Due; STREAMS.len()],
     /// The next parameter of a list that was asked for.
     pub next_parameter: Option<usize>,
+    /// What it was told of that is not done.
+    pub told_of: Told,
     /// Where a stream of targets last sent the vehicle, north, east, down, heading.
     pub target: Option<[f32; 4]>,
 }
@@ -87,6 +91,7 @@ impl<C> Client<C> {
             signer: guard.map(|guard| Signer::new(guard.key.clone(), 0, guard.epoch)),
             due,
             next_parameter: None,
+            told_of: Told::NEVER,
             target: None,
         }
     }
@@ -94,6 +99,11 @@ impl<C> Client<C> {
     /// What is said from now on is said at this instant.
     pub const fn at(&mut self, now: Instant) {
         self.now = now;
+    }
+
+    /// The second in which something is said.
+    pub const fn second(&self) -> u64 {
+        self.now.as_micros() / 1_000_000
     }
 
     /// May it be sent to? Whoever has to sign and has not is sent nothing that it did not connect for.
@@ -129,8 +139,8 @@ impl<C> Client<C> {
             return Some(Fed::Tunnel(frame.system, Tunnel::read(frame.payload)?));
         }
         Some(match Heard::read(&frame)? {
-            Ok(message) => Fed::Message(frame.system, message),
-            Err(message) => Fed::Unreadable(frame.system, message),
+            Ok(message) => Fed::Message([frame.system, frame.component], message),
+            Err(message) => Fed::Unreadable([frame.system, frame.component], message),
         })
     }
 

@@ -1,21 +1,24 @@
 //! Commands, and what becomes of each.
 //!
-//! A command is acknowledged when it has reached the vehicle, not when it has been carried out: arming that would be refused is
-//! denied at once, with the reasons as texts. What a program may ask for while another one commands is the
-//! [lease](crate::lease)'s decision, acknowledged as `NOT_IN_CONTROL`.
+//! What changes the vehicle's state is acknowledged when it [has happened](super::orders); arming
+//! that would be refused is denied at once, with the reasons as texts. What a program may ask for
+//! while another one commands is the [lease](crate::lease)'s decision, acknowledged as
+//! `NOT_IN_CONTROL`.
 
 use super::calibration::Calibrating;
 use super::client::{Client, Put};
 use super::identity::Own;
+use super::leading::Leading;
 use super::missions::Missions;
+use super::orders::{Asked, Deed, Orders, Rise, say, take_off};
 use super::streams::{STREAMS, make, text};
+use super::unserved::Unserved;
 use crate::cockpit::{Cockpit, Request};
 use crate::refusal::{Refusal, Seat};
-use core::fmt::Write;
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
-use stampfly_types::messages::{FlightPhase, GuidedCommand, GuidedKind};
-use stampfly_types::{Duration, Instant, Vec3, frame};
+use stampfly_types::messages::{ArmBlocks, FlightStatus, GuidedCommand};
+use stampfly_types::{Duration, Instant, Vec3};
 
 /// A command with its parameters, however it came. Positions of `COMMAND_INT` are whole numbers of units that only a place on
 /// Earth needs, so none is taken from them.
@@ -23,12 +26,26 @@ pub(super) struct Command {
     kind: MavCmd,
     /// The first is number 1.
     parameters: [f32; 7],
+    /// It is sent again, because no acknowledgement has come.
+    is_repeated: bool,
 }
 
 impl From<&COMMAND_LONG_DATA> for Command {
     fn from(command: &COMMAND_LONG_DATA) -> Self {
         let COMMAND_LONG_DATA { param1, param2, param3, param4, param5, param6, param7, command: kind, .. } = *command;
-        Self { kind, parameters: [param1, param2, param3, param4, param5, param6, param7] }
+        let parameters = [param1, param2, param3, param4, param5, param6, param7];
+        Self { kind, parameters, is_repeated: command.confirmation > 0 }
+    }
+}
+
+/// Obeyed as the command that has superseded it, and acknowledged as that, as PX4 does. PX4 has
+/// main mode and sub-mode in the upper two bytes of its own modes.
+impl From<&SET_MODE_DATA> for Command {
+    fn from(mode: &SET_MODE_DATA) -> Self {
+        let [_, _, main, sub] = mode.custom_mode.to_le_bytes().map(f32::from);
+        let flags = f32::from(mode.base_mode.bits());
+        let parameters = [flags, main, sub, 0.0, 0.0, 0.0, 0.0];
+        Self { kind: MavCmd::MAV_CMD_DO_SET_MODE, parameters, is_repeated: false }
     }
 }
 
@@ -40,7 +57,7 @@ impl From<&COMMAND_INT_DATA> for Command {
             MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION => [x as f32, y as f32],
             _ => [f32::NAN; 2],
         };
-        Self { kind, parameters: [param1, param2, param3, param4, x, y, z] }
+        Self { kind, parameters: [param1, param2, param3, param4, x, y, z], is_repeated: false }
     }
 }
 
@@ -49,82 +66,102 @@ fn whole(number: f32) -> Option<u32> {
     (number.is_finite() && (0.0..=16_777_215.0).contains(&number)).then_some(number as u32)
 }
 
+/// Why an item cannot be the next one.
+pub(super) const NO_ITEM: &str = "the mission has no such item";
+
 /// What a command meets: the vehicle, who asks, and where answers go.
 pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub now: Instant,
     pub own: &'t Own,
+    /// System and component that asks.
+    pub asker: [u8; 2],
     pub client: &'t mut Client<C>,
     pub missions: &'t mut Missions<C, ITEMS>,
     pub calibrating: &'t mut Calibrating<C>,
+    pub orders: &'t mut Orders<C>,
+    pub leading: &'t mut Leading<C>,
     pub seat: Seat,
     pub cockpit: &'t mut dyn Cockpit,
     pub put: Put<'p, C>,
 }
 
-/// Does what is asked, and acknowledges it.
+/// Carries a command out, and acknowledges it, now or when it has happened.
 pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
+    let number = command.kind as u16;
     let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
-        let Turn { now, client, calibrating, cockpit, put, .. } = &mut turn;
-        // What takes longer is acknowledged there.
-        let Err(result) = calibrating.ask(*now, client, &command.parameters, &mut **cockpit, &mut **put) else {
-            return;
-        };
-        result
+        let Turn { now, client, asker, calibrating, cockpit, put, .. } = &mut turn;
+        calibrating.ask(*now, client, *asker, &command.parameters, &mut **cockpit, &mut **put).err()
     } else {
-        turn.outcome(command)
+        turn.outcome(number, command)
     };
-    let ack = COMMAND_ACK_DATA { command: command.kind, result, ..Default::default() };
-    turn.client.send(&ack.into(), turn.put);
+    if let Some(result) = result {
+        let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS { u8::MAX } else { 0 };
+        acknowledge(turn.client, number, turn.asker, (result, progress), turn.put);
+    }
 }
 
 /// Says that a command that this dialect does not have is not supported.
-pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, put: Put<'_, C>) {
+pub(super) fn refuse<C>(client: &mut Client<C>, number: u16, asker: [u8; 2], put: Put<'_, C>) {
+    acknowledge(client, number, asker, (MavResult::MAV_RESULT_UNSUPPORTED, 0), put);
+}
+
+/// Says to who has asked what has become of the command with this number, and how far it is in per
+/// cent.
+///
+/// Written as bytes, because the dialect has not every number: the command, its result, the
+/// progress, four bytes of no meaning here, and the addressee.
+pub(super) fn acknowledge<C>(
+    client: &mut Client<C>,
+    number: u16,
+    [system, component]: [u8; 2],
+    (result, progress): (MavResult, u8),
+    put: Put<'_, C>,
+) {
     let [low, high] = number.to_le_bytes();
-    let payload = [low, high, MavResult::MAV_RESULT_UNSUPPORTED as u8, 0, 0, 0, 0, 0, 0, 0];
+    let payload = [low, high, result as u8, progress, 0, 0, 0, 0, system, component];
     client.send_payload(COMMAND_ACK_DATA::ID, &payload, put);
 }
 
 impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
-    fn outcome(&mut self, Command { kind, parameters: [p1, p2, p3, .., p7] }: &Command) -> MavResult {
+    /// What becomes of a command. `None`: it is acknowledged when it has happened.
+    fn outcome(&mut self, number: u16, command: &Command) -> Option<MavResult> {
+        let Command { kind, parameters: [p1, p2, p3, .., p7], is_repeated } = command;
         let status = self.cockpit.view().state();
-        match kind {
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => {
-                if !status.armed && !status.blocks.is_empty() {
-                    for name in status.blocks.names() {
-                        self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), self.put);
-                    }
-                    return MavResult::MAV_RESULT_DENIED;
-                }
-                self.guide(simple(GuidedKind::Arm))
-            }
+        // A mission may have begun since the acknowledgement that was lost: it is not ended.
+        let is_done = |deed: Deed| *is_repeated && deed.has_happened(&status);
+        Some(match kind {
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 && is_done(Deed::Arm) => MavResult::MAV_RESULT_ACCEPTED,
+            MavCmd::MAV_CMD_NAV_TAKEOFF if is_done(Deed::TakeOff) => MavResult::MAV_RESULT_ACCEPTED,
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => return self.does(number, Deed::Arm, *p7),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
                 // 21196 says "whatever it does": motors off.
                 let force = *p2 == 21_196.0;
-                self.guide(simple(if force { GuidedKind::Kill } else { GuidedKind::Disarm }))
+                return self.does(number, if force { Deed::Kill } else { Deed::Disarm }, *p7);
             }
-            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => self.guide(simple(GuidedKind::Kill)),
-            MavCmd::MAV_CMD_NAV_TAKEOFF if !status.armed => MavResult::MAV_RESULT_DENIED,
-            MavCmd::MAV_CMD_NAV_TAKEOFF => {
-                let height = if p7.is_finite() && *p7 > 0.0 { *p7 } else { self.own.identity.take_off_height };
-                let position = Vec3::new(0.0, 0.0, -height);
-                self.guide(GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() })
-            }
-            MavCmd::MAV_CMD_NAV_LAND => self.guide(simple(GuidedKind::Land)),
-            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => self.guide(simple(GuidedKind::Hold)),
-            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => self.come_back(),
-            MavCmd::MAV_CMD_DO_SET_MODE => self.set_mode(*p1, *p2, *p3),
+            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => return self.does(number, Deed::Kill, *p7),
+            MavCmd::MAV_CMD_NAV_TAKEOFF => return self.does(number, Deed::TakeOff, *p7),
+            MavCmd::MAV_CMD_NAV_LAND => return self.does(number, Deed::Land, *p7),
+            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => return self.does(number, Deed::Hold, *p7),
+            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => return self.does(number, Deed::Return, *p7),
+            MavCmd::MAV_CMD_DO_SET_MODE => return self.set_mode(number, [*p1, *p2, *p3]),
             MavCmd::MAV_CMD_MISSION_START => match whole(*p1) {
                 Some(0) => self.start_mission(),
                 // Another first item than the first.
                 Some(place) if self.missions.set_current(place as usize) => self.start_mission(),
-                _ => MavResult::MAV_RESULT_DENIED,
+                _ => {
+                    self.not_started(&NO_ITEM);
+                    MavResult::MAV_RESULT_DENIED
+                }
             },
-            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => self.guide(simple(GuidedKind::Hold)),
+            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => return self.does(number, Deed::Hold, *p7),
             MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 1.0 => self.start_mission(),
             MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => {
                 match whole(*p1).is_some_and(|place| self.missions.set_current(place as usize)) {
                     true => MavResult::MAV_RESULT_ACCEPTED,
-                    false => MavResult::MAV_RESULT_DENIED,
+                    false => {
+                        say(self.client, "not the current item", &NO_ITEM, self.put);
+                        MavResult::MAV_RESULT_DENIED
+                    }
                 }
             }
             MavCmd::MAV_CMD_REQUEST_MESSAGE => whole(*p1).map_or(MavResult::MAV_RESULT_UNSUPPORTED, |id| self.show(id)),
@@ -141,76 +178,145 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                 })
             }
             _ => MavResult::MAV_RESULT_UNSUPPORTED,
-        }
+        })
     }
 
-    /// Asks the vehicle for something. Whatever else was asked of it, a mission included, is over then.
-    fn guide(&mut self, command: GuidedCommand) -> MavResult {
-        let asked = self.cockpit.guide(self.now, self.seat, command);
-        match command.kind {
-            _ if asked.is_err() => {}
-            GuidedKind::Arm => self.missions.runner.arms(self.now),
-            _ => _ = self.missions.runner.halt(),
+    /// Asks the vehicle for something that changes its state. `None`: it is acknowledged when that
+    /// has happened. A take-off has a height, m.
+    fn does(&mut self, number: u16, deed: Deed, height: f32) -> Option<MavResult> {
+        let status = self.cockpit.view().state();
+        let asked = Asked { client: self.client.id, asker: self.asker, number, deed };
+        if self.orders.has(&asked) {
+            if deed.ends_a_flight() {
+                // Twice is once, and the first may have been lost on a radio.
+                _ = self.ask_for(deed, height);
+            }
+            return Some(MavResult::MAV_RESULT_IN_PROGRESS);
         }
-        result(asked)
+        if self.orders.is_full() && !deed.ends_a_flight() {
+            say(self.client, deed.denied(), &"too many commands at once", self.put);
+            return Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        }
+        let height = if height.is_finite() && height > 0.0 { height } else { self.own.identity.take_off_height };
+        if deed == Deed::TakeOff && !status.armed && self.orders.is_arming() {
+            // Sent together with the command to arm: it waits for that.
+            self.orders.wait(self.now, asked, self.seat, Rise::Waits(height), self.cockpit);
+            return None;
+        }
+        if deed == Deed::Arm && self.is_blocked(&status) {
+            return Some(MavResult::MAV_RESULT_DENIED);
+        }
+        if let Some(why) = deed.refusal(&status) {
+            say(self.client, deed.denied(), &why, self.put);
+            return Some(MavResult::MAV_RESULT_DENIED);
+        }
+        if let Err(refusal) = self.ask_for(deed, height) {
+            say(self.client, deed.denied(), &refusal, self.put);
+            return Some(result(Err(refusal)));
+        }
+        let has_happened = deed.has_happened(&status);
+        let waits = !has_happened && self.orders.wait(self.now, asked, self.seat, Rise::Asked, self.cockpit);
+        (!waits).then_some(MavResult::MAV_RESULT_ACCEPTED)
+    }
+
+    /// Would arming be refused? Then every reason is said. Silence of all programs is none: the
+    /// command ends it.
+    fn is_blocked(&mut self, status: &FlightStatus) -> bool {
+        let blocks = status.blocks.without(ArmBlocks::NO_LINK);
+        if status.armed || blocks.is_empty() {
+            return false;
+        }
+        for name in blocks.names() {
+            self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "not armed: ", name), self.put);
+        }
+        true
+    }
+
+    /// Asks the vehicle. Whatever else was asked of it, a mission included, is over then.
+    fn ask_for(&mut self, deed: Deed, height: f32) -> Result<(), Refusal> {
+        match deed {
+            Deed::TakeOff => self.cockpit.guide(self.now, self.seat, take_off(height))?,
+            Deed::Return => {
+                let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
+                let home = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..deed.command() };
+                self.cockpit.fly_to(self.now, self.seat, home)?;
+            }
+            _ => self.cockpit.guide(self.now, self.seat, deed.command())?,
+        }
+        match deed {
+            Deed::Arm => self.missions.runner.arms(self.now),
+            _ => {
+                self.missions.runner.halt();
+                self.leading.stop();
+            }
+        }
+        if deed.ends_a_flight() {
+            self.orders.end();
+        }
+        Ok(())
     }
 
     fn request(&mut self, request: Request) -> MavResult {
-        result(self.cockpit.request(self.now, request))
-    }
-
-    fn come_back(&mut self) -> MavResult {
-        if self.cockpit.view().state().phase != FlightPhase::Flying {
-            return MavResult::MAV_RESULT_UNSUPPORTED;
-        }
-        let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
-        let place = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..Default::default() };
-        let asked = self.cockpit.fly_to(self.now, self.seat, place);
-        if asked.is_ok() {
-            self.missions.runner.halt();
+        let asked = self.cockpit.request(self.now, request);
+        if let Err(refusal) = &asked {
+            say(self.client, "denied", refusal, self.put);
         }
         result(asked)
     }
 
     fn start_mission(&mut self) -> MavResult {
         if self.missions.is_empty() {
+            self.not_started(&"there is none");
             return MavResult::MAV_RESULT_DENIED;
         }
         // Takes the lease, or says who has it.
         let asked = self.cockpit.guide(self.now, self.seat, GuidedCommand::default());
-        if asked.is_err() {
+        if let Err(refusal) = asked {
+            self.not_started(&refusal);
             return result(asked);
         }
         match self.missions.runner.start(self.now, self.seat, self.cockpit) {
             Ok(()) => {
+                self.leading.stop();
                 self.client.send(&self.missions.state(), self.put);
                 MavResult::MAV_RESULT_ACCEPTED
             }
             Err(why) => {
-                let mut words = heapless::String::<50>::new();
-                _ = write!(words, "{why}");
-                self.client.send(&text(MavSeverity::MAV_SEVERITY_ERROR, "mission not started: ", &words), self.put);
+                self.not_started(&why);
                 MavResult::MAV_RESULT_DENIED
             }
         }
     }
 
+    fn not_started(&mut self, why: &dyn core::fmt::Display) {
+        say(self.client, "mission not started", why, self.put);
+    }
+
     /// Modes have numbers of their own in every autopilot. Understood are MAVLink's own flags, "auto" for a mission and "guided" for staying in place, and
-    /// the numbers of PX4 (main mode 4, "auto"), which programs send to whatever is not ArduPilot.
-    fn set_mode(&mut self, flags: f32, main: f32, sub: f32) -> MavResult {
+    /// the numbers of PX4 (main modes 4, "auto", and 6, "offboard"), which programs send to
+    /// whatever is not ArduPilot.
+    fn set_mode(&mut self, number: u16, [flags, main, sub]: [f32; 3]) -> Option<MavResult> {
         let flags = whole(flags).and_then(|flags| u8::try_from(flags).ok()).map(MavModeFlag::from_bits_truncate);
-        let Some(flags) = flags else { return MavResult::MAV_RESULT_DENIED };
+        let Some(flags) = flags else { return Some(MavResult::MAV_RESULT_DENIED) };
         let custom = flags.contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED);
         match (whole(main), whole(sub)) {
-            (Some(4), Some(3)) if custom => self.guide(simple(GuidedKind::Hold)),
-            (Some(4), Some(4)) if custom => self.start_mission(),
-            (Some(4), Some(5)) if custom => self.come_back(),
-            (Some(4), Some(6)) if custom => self.guide(simple(GuidedKind::Land)),
-            _ if custom => MavResult::MAV_RESULT_UNSUPPORTED,
-            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => self.start_mission(),
-            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.guide(simple(GuidedKind::Hold)),
-            _ => MavResult::MAV_RESULT_UNSUPPORTED,
+            (Some(4), Some(3)) if custom => self.does(number, Deed::Guided, 0.0),
+            (Some(4), Some(4)) if custom => Some(self.start_mission()),
+            (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
+            (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
+            // Set-points are flown in no mode of their own; programs ask for one before they send
+            // them.
+            (Some(6), _) if custom => self.does(number, Deed::Guided, 0.0),
+            _ if custom => self.no_such_mode(),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.does(number, Deed::Guided, 0.0),
+            _ => self.no_such_mode(),
         }
+    }
+
+    fn no_such_mode(&mut self) -> Option<MavResult> {
+        self.client.complain(Unserved::Mode, &"this vehicle does not have it", self.put);
+        Some(MavResult::MAV_RESULT_UNSUPPORTED)
     }
 
     /// Sends one message.
@@ -223,10 +329,6 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         self.client.send(&message, self.put);
         MavResult::MAV_RESULT_ACCEPTED
     }
-}
-
-fn simple(kind: GuidedKind) -> GuidedCommand {
-    GuidedCommand { kind, ..Default::default() }
 }
 
 fn result(asked: Result<(), Refusal>) -> MavResult {
@@ -254,43 +356,4 @@ fn set_interval<C>(now: Instant, client: &mut Client<C>, id: f32, interval_us: f
     };
     due.next = now;
     MavResult::MAV_RESULT_ACCEPTED
-}
-
-/// Sends the vehicle to a place. Programs repeat the same target many times a second: only a new one is passed on.
-pub(super) fn go_to<C: Copy + PartialEq, const ITEMS: usize>(
-    turn: Turn<'_, '_, C, ITEMS>,
-    target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
-) {
-    let Turn { now, client, missions, seat, cockpit, .. } = turn;
-    type Mask = PositionTargetTypemask;
-    let place = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Y_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Z_IGNORE;
-    // A place, or nothing: velocities alone are not flown.
-    if target.type_mask.intersects(place) || cockpit.view().state().phase != FlightPhase::Flying {
-        return;
-    }
-    let Some((_, estimate)) = cockpit.view().estimate() else { return };
-    let asked = Vec3::new(target.x, target.y, target.z);
-    let position = match target.coordinate_frame {
-        MavFrame::MAV_FRAME_LOCAL_NED => asked,
-        MavFrame::MAV_FRAME_LOCAL_OFFSET_NED => estimate.position + asked,
-        MavFrame::MAV_FRAME_BODY_FRD => {
-            estimate.position + frame::from_yaw(frame::yaw(&estimate.attitude)).transform_vector(&asked)
-        }
-        _ => return,
-    };
-    let turns = !target.type_mask.contains(Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE);
-    let yaw = if turns { target.yaw } else { frame::yaw(&estimate.attitude) };
-    let [x, y, z] = asked.to_array();
-    // Without a heading of its own, the present one must not make the target look new.
-    let new = [x, y, z, if turns { yaw } else { 0.0 }];
-    // What a mission has done since makes an old target a new one.
-    if client.target == Some(new) && !missions.runner.is_running() {
-        return;
-    }
-    if cockpit.fly_to(now, seat, GuidedCommand { position, yaw, ..Default::default() }).is_ok() {
-        client.target = Some(new);
-        missions.runner.halt();
-    }
 }

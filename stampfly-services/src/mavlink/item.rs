@@ -55,7 +55,9 @@ impl From<&MISSION_ITEM_DATA> for Item {
     fn from(item: &MISSION_ITEM_DATA) -> Self {
         let MISSION_ITEM_DATA { param1, param2, param3, param4, x, y, z, command, frame, autocontinue, .. } = *item;
         let factor = if matches!(kind(frame), Some(Frame::Relative | Frame::Sea)) { 1e7 } else { f64::from(PER_METRE) };
-        let [x, y] = [x, y].map(|number| if number.is_finite() { (f64::from(number) * factor) as i32 } else { UNSET });
+        // To the nearest whole number.
+        let scaled = |number: f32| f64::from(number) * factor + if number < 0.0 { -0.5 } else { 0.5 };
+        let [x, y] = [x, y].map(|number| if number.is_finite() { scaled(number) as i32 } else { UNSET });
         Self { command, frame, parameters: [param1, param2, param3, param4], x, y, z, autocontinue }
     }
 }
@@ -92,6 +94,16 @@ impl Item {
             mission_type: MavMissionType::MAV_MISSION_TYPE_MISSION,
         };
         data.into()
+    }
+
+    /// Is it this one, to the bit?
+    pub fn is(&self, other: &Self) -> bool {
+        let bits = |item: &Self| {
+            let [a, b, c, d] = item.parameters.map(f32::to_bits);
+            ([a, b, c, d, item.z.to_bits()], item.x, item.y)
+        };
+        let same = (self.command, self.frame, self.autocontinue) == (other.command, other.frame, other.autocontinue);
+        same && bits(self) == bits(other)
     }
 
     /// Is its position one on Earth?

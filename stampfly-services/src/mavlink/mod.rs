@@ -8,9 +8,13 @@
 //! | `answer.rs` | which message goes where |
 //! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`](crate::View) |
 //! | `commands.rs` | commands, and what becomes of each |
+//! | `orders.rs` | those that change the vehicle's state, until it is seen that they have happened |
 //! | `calibration.rs` | calibrations, which take longer than a command |
 //! | `unreadable.rs` | commands and items that this dialect does not have, which are answered too |
 //! | `parameters.rs` | the parameter protocol; names of at most 16 characters |
+//! | `targets.rs` | set-points: a place to fly to, or how to move |
+//! | `leading.rs` | velocities, flown as a way-point that moves |
+//! | `unserved.rs` | messages that are refused aloud, once in a while |
 //! | `missions.rs` | the mission protocol |
 //! | `item.rs` | a mission item, and the [step](crate::mission::Step) that it means |
 //!
@@ -32,11 +36,15 @@ mod commands;
 mod heard;
 mod identity;
 mod item;
+mod leading;
 mod missions;
+mod orders;
 mod parameters;
 mod said;
 mod streams;
+mod targets;
 mod unreadable;
+mod unserved;
 
 use crate::cockpit::Cockpit;
 use crate::refusal::Seat;
@@ -47,8 +55,10 @@ use core::fmt::Write;
 use heapless::Vec;
 pub use identity::Identity;
 use identity::Own;
+use leading::Leading;
 pub use missions::ITEMS;
 use missions::Missions;
+use orders::Orders;
 pub use parameters::short_name;
 use said::Said;
 use stampfly_link::mavlink::Tunnel;
@@ -80,6 +90,8 @@ pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions:
     clients: Vec<Client<C>, N>,
     missions: Missions<C, ITEMS>,
     calibrating: Calibrating<C>,
+    orders: Orders<C>,
+    leading: Leading<C>,
     notices: streams::Notices,
     guard: Option<Guard>,
     refused: u32,
@@ -106,6 +118,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             clients: Vec::new(),
             missions: Missions::new(&identity),
             calibrating: Calibrating::new(),
+            orders: Orders::new(),
+            leading: Leading::new(),
             notices: streams::Notices::new(),
             guard: None,
             refused: 0,
@@ -182,6 +196,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
 
     /// Somebody is gone.
     pub fn close(&mut self, client: C) {
+        self.missions.forget(client);
         self.clients.retain(|known| known.id != client);
     }
 
@@ -202,11 +217,11 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
     ) {
         self.open(now, from, false);
         self.own.origin = cockpit.origin().or(self.own.origin);
-        let Self { own, clients, missions, calibrating, guard, untrusted, .. } = self;
+        let Self { own, clients, missions, calibrating, orders, leading, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now);
         for byte in bytes {
-            let (system, said) = match client.feed(*byte, guard.as_mut()) {
+            let (asker, said) = match client.feed(*byte, guard.as_mut()) {
                 None => continue,
                 Some(Fed::Untrusted(why)) => {
                     *untrusted = untrusted.wrapping_add(1);
@@ -227,8 +242,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                     }
                     continue;
                 }
-                Some(Fed::Message(system, message)) => (system, Ok(message)),
-                Some(Fed::Unreadable(system, message)) => (system, Err(message)),
+                Some(Fed::Message(asker, message)) => (asker, Ok(message)),
+                Some(Fed::Unreadable(asker, message)) => (asker, Err(message)),
             };
             let turn = Turn {
                 now,
@@ -236,13 +251,16 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 client: &mut *client,
                 missions: &mut *missions,
                 calibrating: &mut *calibrating,
-                seat: Seat::Mavlink(system),
+                orders: &mut *orders,
+                leading: &mut *leading,
+                asker,
+                seat: Seat::Mavlink(asker[0]),
                 cockpit: &mut *cockpit,
                 put: &mut *put,
             };
             match said {
-                Ok(message) => own.origin = answer::message(turn, system, &message).or(own.origin),
-                Err(message) => answer::unreadable(turn, system, message),
+                Ok(message) => own.origin = answer::message(turn, &message).or(own.origin),
+                Err(message) => answer::unreadable(turn, message),
             }
         }
     }
@@ -278,6 +296,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             client.send_due(now, &self.own, &cockpit.view(), put);
             parameters::send_next(client, cockpit.parameters(), put);
         }
+        self.orders.poll(now, &mut self.clients, cockpit, &mut self.missions.runner, put);
+        self.leading.poll(now, cockpit);
         self.missions.poll(now, &self.own, &mut self.clients, cockpit, put);
         self.calibrating.poll(now, &mut self.clients, cockpit, put);
     }

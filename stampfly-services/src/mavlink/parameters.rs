@@ -6,6 +6,7 @@
 
 use super::client::{Client, Put};
 use super::said::Said;
+use super::unserved::Unserved;
 use crate::cockpit::Cockpit;
 use core::fmt::Write;
 use heapless::String;
@@ -83,10 +84,11 @@ pub(super) fn send_next<C>(client: &mut Client<C>, parameters: &dyn Parameters, 
     }
 }
 
-/// Answers a question for one. Nothing is said of one that there is not.
+/// Answers a question for one.
 pub(super) fn read<C>(
     client: &mut Client<C>,
     request: &PARAM_REQUEST_READ_DATA,
+    asker: [u8; 2],
     parameters: &dyn Parameters,
     put: Put<'_, C>,
 ) {
@@ -95,16 +97,42 @@ pub(super) fn read<C>(
         // Negative: by name.
         Err(_) => find(parameters, &request.param_id.into()),
     };
-    if let Some(message) = index.and_then(|index| value(parameters, index)) {
-        client.send(&message, put);
+    match index.and_then(|index| value(parameters, index)) {
+        Some(message) => client.send(&message, put),
+        None => unknown(client, &request.param_id.into(), request.param_index, asker, put),
+    }
+}
+
+/// Says that there is no such parameter: to programs each time, to people once in a while.
+fn unknown<C>(client: &mut Client<C>, id: &[u8; NAME], index: i16, asker: [u8; 2], put: Put<'_, C>) {
+    let [target_system, target_component] = asker;
+    let error = PARAM_ERROR_DATA {
+        param_index: index,
+        target_system,
+        target_component,
+        param_id: (*id).into(),
+        error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+    };
+    client.send(&error.into(), put);
+    match id.utf8_chunks().next().map(|text| text.valid().trim_end_matches('\0')) {
+        Some(name) if index < 0 => client.complain(Unserved::Parameter, &name, put),
+        _ => client.complain(Unserved::Parameter, &index, put),
     }
 }
 
 /// Sets one, and answers with what it is then.
-pub(super) fn set<C>(client: &mut Client<C>, request: &PARAM_SET_DATA, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+pub(super) fn set<C>(
+    client: &mut Client<C>,
+    request: &PARAM_SET_DATA,
+    asker: [u8; 2],
+    cockpit: &mut dyn Cockpit,
+    put: Put<'_, C>,
+) {
     let armed = cockpit.view().state().armed;
     let parameters = cockpit.parameters();
-    let Some(index) = find(parameters, &request.param_id.into()) else { return };
+    let Some(index) = find(parameters, &request.param_id.into()) else {
+        return unknown(client, &request.param_id.into(), -1, asker, put);
+    };
     let name: String<64> = parameters.describe(index).and_then(|info| info.name.try_into().ok()).unwrap_or_default();
     let waits = armed && parameters.describe(index).is_some_and(|info| !info.in_flight);
     // Two names and a sentence.

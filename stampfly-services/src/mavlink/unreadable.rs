@@ -4,7 +4,7 @@
 //! of these is answered.
 
 /// Longest of them, with its extensions.
-const LONGEST: usize = 38;
+const LONGEST: usize = 53;
 
 /// A message that wants an answer although it cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub(super) enum Unreadable {
     Command { number: u16, target: [u8; 2] },
     /// `MISSION_ITEM_INT` or `MISSION_ITEM` of this kind of mission, for this system and component.
     Item { sequence: u16, kind: u8, target: [u8; 2] },
+    /// A set-point for this system and component.
+    Target { target: [u8; 2] },
 }
 
 impl Unreadable {
@@ -25,12 +27,15 @@ impl Unreadable {
         for (to, from) in whole.iter_mut().zip(payload) {
             *to = *from;
         }
-        // Seven numbers of four bytes come first in all of them.
-        let &[low, high, a, b, c, d, _, _, _, kind] = whole.last_chunk()?;
+        // Seven numbers of four bytes come first in commands and items.
+        let &[low, high, a, b, c, d, _, _, _, kind] = whole.get(28..)?.first_chunk()?;
+        let target = |at: usize| Some(Self::Target { target: *whole.get(at..)?.first_chunk()? });
         let number = u16::from_le_bytes([low, high]);
         match id {
             0 => Some(Self::Heartbeat),
             75 | 76 => Some(Self::Command { number, target: [a, b] }),
+            82 => target(36),
+            84 | 86 => target(50),
             39 | 73 => Some(Self::Item { sequence: number, kind, target: [c, d] }),
             _ => None,
         }

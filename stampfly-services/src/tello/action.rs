@@ -18,8 +18,13 @@ const AIMED: f32 = 0.06;
 const FOLLOWS: f32 = 0.5;
 /// Turns are flown in parts of at most a quarter: a heading alone does not say which way round.
 const QUARTER: f32 = core::f32::consts::FRAC_PI_2;
-/// What takes longer has failed. Programs wait seven seconds for most answers and twenty for a take-off.
-const LONGEST: Duration = Duration::from_secs(20);
+/// What takes longer has failed. Programs wait seven seconds for most answers and twenty for a
+/// take-off; one that waits says nothing else, and is taken for gone after fifteen: it has to be
+/// answered before.
+const LONGEST: Duration = Duration::from_secs(14);
+/// A vehicle that has not armed after this long does not, and one that has not begun to turn over.
+const ARMS: Duration = Duration::from_millis(2_500);
+const TURNS_OVER: Duration = Duration::from_secs(1);
 /// So long a take-off waits until the vehicle may arm: its calibration takes a few seconds after power-on.
 const READY: Duration = Duration::from_secs(8);
 /// The vehicle has seen a command after this long, and answers for it.
@@ -181,7 +186,7 @@ impl Action {
                 }
                 Outcome::GoesOn
             }
-            Kind::Arming if age >= LONGEST / 8 => Outcome::Failed("motors do not start"),
+            Kind::Arming if age >= ARMS => Outcome::Failed("motors do not start"),
             Kind::Rising if status.phase == FlightPhase::Flying => Outcome::Done,
             Kind::Landing if !status.armed => Outcome::Done,
             Kind::Stopping => Outcome::Done,
@@ -191,7 +196,7 @@ impl Action {
                 match status.phase {
                     FlightPhase::Flip => Outcome::GoesOn,
                     FlightPhase::Flying if *begun => Outcome::Done,
-                    FlightPhase::Flying if age < LONGEST / 20 => Outcome::GoesOn,
+                    FlightPhase::Flying if age < TURNS_OVER => Outcome::GoesOn,
                     _ => Outcome::Failed("no flip now"),
                 }
             }

@@ -163,7 +163,11 @@ impl<C: Copy + PartialEq> Tello<C> {
         self.in_air = self.took_off.map_or(self.in_air, |took_off| now.since(took_off));
         let Some((program, heard)) = self.program else { return };
         if now.since(heard) >= SILENCE {
-            (self.action, self.sticks) = (None, None);
+            // It may be there, and wait for what it has asked for.
+            if self.action.take().is_some() {
+                send(&program, &TelloReply::Error("no command for 15 s"), put);
+            }
+            self.sticks = None;
             return;
         }
         cockpit.alive(now, Seat::Tello);

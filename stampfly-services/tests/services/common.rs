@@ -7,7 +7,9 @@ use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
 use stampfly_services::{Cockpit, Lease, Places, Refusal, Request, Seat, View};
-use stampfly_types::messages::{FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity};
+use stampfly_types::messages::{
+    CommandSource, FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity,
+};
 use stampfly_types::{Instant, Message};
 
 pub mod topics {
@@ -26,6 +28,8 @@ pub mod topics {
         estimate_state: StateEstimate = latest @ 400 Hz from stack => [services];
         /// State.
         flight_status: FlightStatus = latest @ 400 Hz from stack => [services];
+        /// Refusals to arm.
+        arm_refusals: ArmRefusals = latest @ on event from stack => [services];
         /// Alerts.
         system_alert: SystemAlert = latest @ 400 Hz from stack => [services];
         /// Set-point.
@@ -143,10 +147,12 @@ impl Vehicle {
         vehicle
     }
 
-    /// Flying, at the origin.
+    /// Flying at the origin, for a program.
     pub fn flying() -> Self {
         let mut vehicle = Self::standing();
-        vehicle.status(|status| (status.phase, status.armed) = (FlightPhase::Flying, true));
+        vehicle.status(|status| {
+            (status.phase, status.armed, status.commander) = (FlightPhase::Flying, true, CommandSource::Guided);
+        });
         vehicle
     }
 

@@ -8,8 +8,14 @@ mod desk;
 mod mavlink;
 #[cfg(feature = "mavlink")]
 mod mission;
+#[cfg(feature = "mavlink")]
+mod mission_line;
 mod msp;
 #[cfg(feature = "network")]
 mod network;
+#[cfg(feature = "mavlink")]
+mod orders;
 mod streams;
+#[cfg(feature = "mavlink")]
+mod targets;
 mod tello;

@@ -210,3 +210,50 @@ fn of_misc_only_what_is_sent_changes() {
         assert_eq!(asked(&mut vehicle, id, &[]), framed(b'!', id, &[]), "armed");
     }
 }
+
+#[test]
+fn a_question_that_there_is_no_room_for_is_answered_with_an_error_and_the_next_one_is_understood() {
+    let mut vehicle = Vehicle::standing();
+    let jumbo = {
+        let mut bytes = vec![b'$', b'M', b'<', 255, 199, 0x2C, 1];
+        bytes.extend([0x24; 300]);
+        bytes.push(bytes[3..].iter().fold(0, |all, byte| all ^ byte));
+        bytes
+    };
+    let second = {
+        let mut bytes = [0; 400];
+        let frame = stampfly_services::link::msp::MspFrame {
+            version: stampfly_services::link::msp::Version::Two,
+            payload: &[9; 300],
+            ..stampfly_services::link::msp::MspFrame::request(0x1234)
+        };
+        let length = frame.write(&mut bytes).expect("there is room");
+        bytes[..length].to_vec()
+    };
+    for (question, error) in [
+        (framed(b'<', 199, &[0; 200]), framed(b'!', 199, &[])),
+        (framed(b'<', 199, &[0; 59]), framed(b'!', 199, &[])),
+        (jumbo, framed(b'!', 199, &[])),
+        (second, vec![b'$', b'X', b'!', 0, 0x34, 0x12, 0, 0, 0xB5]),
+        (framed(b'>', 199, &[0; 200]), vec![]),
+    ] {
+        let attitude = asked(&mut vehicle, 108, &[]);
+        let mut answer = ask(&mut vehicle, &question);
+        if question[1] == b'X' {
+            // Its check is another crate's business.
+            answer.pop();
+            assert_eq!(answer, error[..8]);
+        } else {
+            assert_eq!(answer, error);
+        }
+        let mut both = question.clone();
+        both.extend(framed(b'<', 108, &[]));
+        assert!(ask(&mut vehicle, &both).ends_with(&attitude));
+        // One that is not whole, and one that is spoiled.
+        let cut = &question[..question.len() - 1];
+        assert_eq!(ask(&mut vehicle, cut), Vec::<u8>::new());
+        let mut spoiled = question;
+        *spoiled.last_mut().expect("a check") ^= 1;
+        assert_eq!(ask(&mut vehicle, &spoiled), Vec::<u8>::new());
+    }
+}

@@ -188,3 +188,38 @@ fn what_is_no_command_says_why() {
     assert_eq!(talk.hear(1, "streamon"), ["error not supported"]);
     assert_eq!(talk.hear(1, "battery?"), ["0"]);
 }
+
+#[test]
+fn a_turn_of_any_size_is_answered_before_the_program_is_taken_for_gone() {
+    for (text, answer, after) in [("cw 400", "ok", 0.0..10.0), ("cw 3600", "error took too long", 13.9..14.1)] {
+        let mut talk = Talk::new(Vehicle::flying());
+        talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+        talk.hear(1, "command");
+        assert_eq!(talk.hear(1, text), Vec::<String>::new());
+        let (mut yaw, mut answers) = (0.0_f32, Vec::new());
+        while answers.is_empty() && talk.now < Instant::from_secs(20) {
+            answers = talk.wait(1);
+            let goal = talk.vehicle.guided.last().map_or(yaw, |command| command.yaw);
+            // 1.5 rad/s.
+            let way = stampfly_types::math::wrap_angle(goal - yaw).clamp(-0.03, 0.03);
+            yaw = stampfly_types::math::wrap_angle(yaw + way);
+            talk.is_at(Vec3::new(0.0, 0.0, -0.5), yaw);
+        }
+        let seconds = talk.now.seconds_f64();
+        assert!(answers == [answer] && after.contains(&seconds), "{text}: {answers:?} after {seconds} s");
+    }
+}
+
+#[test]
+fn a_program_that_is_taken_for_gone_is_told_that_nothing_comes_of_its_command() {
+    let mut talk = Talk::new(Vehicle::standing());
+    talk.vehicle.status(|status| status.blocks = ArmBlocks::CALIBRATING);
+    talk.hear(1, "command");
+    talk.hear(1, "takeoff");
+    talk.wait(390);
+    talk.vehicle.status(|status| status.blocks = ArmBlocks::NONE);
+    talk.wait(10);
+    talk.vehicle.status(|status| (status.phase, status.armed) = (FlightPhase::Armed, true));
+    assert_eq!(talk.wait(340), Vec::<String>::new());
+    assert_eq!(talk.wait(20), ["error no command for 15 s"]);
+}

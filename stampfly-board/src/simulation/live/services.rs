@@ -123,7 +123,7 @@ impl Link for Services<'_> {
                 let tello_state = self.tello_state;
                 let mut cockpit = self.controls.seated(&*newest);
                 self.tello.hear(now, from, text, &mut cockpit, &mut |to, what, bytes| {
-                    put(&destination(*to, what, tello_state), bytes);
+                    destination(*to, what, tello_state).into_iter().for_each(|to| put(&to, bytes));
                 });
             }
             (TELLO_STATE, Heard::Opened) => self.tello_state = Some(from.address.port()),
@@ -201,16 +201,34 @@ impl Link for Services<'_> {
         self.controls.answer(now, &*newest, put);
         let mut cockpit = self.controls.seated(&*newest);
         let tello_state = self.tello_state;
-        self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| put(&destination(*to, what, tello_state), bytes));
+        self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| {
+            destination(*to, what, tello_state).into_iter().for_each(|to| put(&to, bytes));
+        });
     }
 }
 
-/// A Tello's state goes to another port of the program's machine.
-fn destination(program: Client, what: Destination, state: Option<u16>) -> Client {
-    match (what, state) {
-        (Destination::State, Some(number)) => {
-            Client { port: TELLO_STATE, address: (program.address.ip(), number).into() }
+/// A Tello's state goes to another port of the program's machine, and nowhere while that is closed:
+/// where answers are awaited it would be taken for one.
+fn destination(program: Client, what: Destination, state: Option<u16>) -> Option<Client> {
+    match what {
+        Destination::Program => Some(program),
+        Destination::State => {
+            let address = (program.address.ip(), state?).into();
+            Some(Client { port: TELLO_STATE, address })
         }
-        _ => program,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tellos_state_goes_to_its_port_or_nowhere() {
+        let program = Client { port: TELLO, address: ([127, 0, 0, 1], 50_000).into() };
+        let state = Client { port: TELLO_STATE, address: ([127, 0, 0, 1], 8_890).into() };
+        assert_eq!(destination(program, Destination::Program, None), Some(program));
+        assert_eq!(destination(program, Destination::State, Some(8_890)), Some(state));
+        assert_eq!(destination(program, Destination::State, None), None);
     }
 }

@@ -1,0 +1,183 @@
+//! Velocities that a program sends again and again.
+//!
+//! A vehicle is asked to fly to places, and knows how fast it may get there. So a velocity is flown
+//! as a way-point that moves ahead of the vehicle's path at this velocity, fifty times a second:
+//! the path follows at the distance in which it could stop, whatever its limits are. When the
+//! program has said nothing for half a second, the vehicle stays where it is, as PX4 and ArduPilot
+//! do after half a second and after three.
+//!
+//! A pilot who takes the sticks, a landing and the failsafe end it. The program has to fall silent
+//! before it may begin again: its stream must not take the vehicle back from the pilot.
+
+use crate::cockpit::Cockpit;
+use crate::refusal::{Refusal, Seat};
+use stampfly_types::messages::{
+    CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
+};
+use stampfly_types::{Duration, Instant, Vec3, math};
+
+/// A program that was not heard for this long does not lead any more, and a vehicle that does not
+/// follow after this long will not.
+const SILENCE: Duration = Duration::from_millis(500);
+/// The way-point is at most so far ahead, m, and this much farther, s, for the velocity of the
+/// path: about what it takes to stop.
+const AHEAD: f32 = 0.15;
+const TO_STOP: f32 = 0.6;
+/// The heading that is wanted is at most so far ahead, rad.
+const TURN_AHEAD: f32 = 0.5;
+/// The path may be faster than the way-point by this factor, as fast as it is, and this fast at
+/// least, m/s, so that it comes to where a slow one is.
+const FASTER: f32 = 1.2;
+const SLOWEST: f32 = 0.3;
+/// Between two moves of the way-point at most, s.
+const LONGEST: f32 = 0.1;
+
+/// How a program wants the vehicle to move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Motion {
+    /// World frame, m/s.
+    pub velocity: Vec3,
+    /// Down, m: instead of a vertical velocity.
+    pub down: Option<f32>,
+    /// Heading, rad; `None` keeps it.
+    pub yaw: Option<f32>,
+    /// Or how fast it turns, rad/s.
+    pub yaw_rate: f32,
+}
+
+/// How far it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// It has begun.
+    Begins,
+    /// The vehicle follows.
+    Followed,
+    /// The vehicle does not follow any more.
+    Over,
+}
+
+/// A program that leads the vehicle.
+#[derive(Clone, Copy, Debug)]
+struct Lead<C> {
+    client: C,
+    seat: Seat,
+    motion: Motion,
+    /// The way-point, and the heading there.
+    place: Vec3,
+    yaw: f32,
+    begun: Instant,
+    heard: Instant,
+    moved: Instant,
+    stage: Stage,
+}
+
+/// The program that leads the vehicle, if one does.
+#[derive(Clone, Debug)]
+pub(super) struct Leading<C>(Option<Lead<C>>);
+
+/// Why a vehicle is not led.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NotLed {
+    Refused(Refusal),
+    /// It does not know where it is.
+    Nowhere,
+    /// It has begun, and the vehicle does not follow.
+    NotFollowed,
+}
+
+/// The path, of a vehicle that flies along one.
+fn path(cockpit: &dyn Cockpit) -> Result<Setpoint, NotLed> {
+    let (_, setpoint) = cockpit.view().setpoint().ok_or(NotLed::Refused(Refusal::Unsupported))?;
+    let place = SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z;
+    if setpoint.axes.contains(place) { Ok(setpoint) } else { Err(NotLed::Nowhere) }
+}
+
+fn follows(status: &FlightStatus) -> bool {
+    status.phase == FlightPhase::Flying && status.commander == CommandSource::Guided
+}
+
+impl<C: Copy + PartialEq> Leading<C> {
+    pub const fn new() -> Self {
+        Self(None)
+    }
+
+    /// Something else was asked of the vehicle.
+    pub const fn stop(&mut self) {
+        self.0 = None;
+    }
+
+    /// A program says how the vehicle is to move. Returns whether it has just begun to.
+    pub fn hear(
+        &mut self,
+        now: Instant,
+        client: C,
+        seat: Seat,
+        motion: &Motion,
+        cockpit: &mut dyn Cockpit,
+    ) -> Result<bool, NotLed> {
+        let known = self.0.as_mut().filter(|lead| lead.client == client && now.since(lead.heard) < SILENCE);
+        if let Some(lead) = known {
+            (lead.motion, lead.heard) = (*motion, now);
+            lead.yaw = motion.yaw.unwrap_or(lead.yaw);
+            return if lead.stage == Stage::Over { Err(NotLed::NotFollowed) } else { Ok(false) };
+        }
+        let path = path(cockpit)?;
+        let (place, yaw) = (path.position, motion.yaw.unwrap_or(path.yaw));
+        let (motion, stage) = (*motion, Stage::Begins);
+        let mut lead = Lead { client, seat, motion, place, yaw, begun: now, heard: now, moved: now, stage };
+        lead.move_on(now, &path, cockpit).map_err(NotLed::Refused)?;
+        self.0 = Some(lead);
+        Ok(true)
+    }
+
+    /// Moves the way-point on. Call it about fifty times a second.
+    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+        let Some(lead) = &mut self.0 else { return };
+        let is_followed = follows(&cockpit.view().state());
+        if now.since(lead.heard) >= SILENCE {
+            if is_followed && lead.stage == Stage::Followed {
+                let hold = GuidedCommand { kind: GuidedKind::Hold, ..Default::default() };
+                _ = cockpit.guide(now, lead.seat, hold);
+            }
+            self.0 = None;
+            return;
+        }
+        lead.stage = match lead.stage {
+            Stage::Over => return,
+            _ if is_followed => Stage::Followed,
+            Stage::Begins if now.since(lead.begun) < SILENCE => Stage::Begins,
+            Stage::Begins | Stage::Followed => Stage::Over,
+        };
+        if lead.stage == Stage::Followed
+            && let Ok(path) = path(cockpit)
+        {
+            // What there is no room for is said with the next one.
+            _ = lead.move_on(now, &path, cockpit);
+        }
+    }
+}
+
+impl<C> Lead<C> {
+    fn move_on(&mut self, now: Instant, path: &Setpoint, cockpit: &mut dyn Cockpit) -> Result<(), Refusal> {
+        let Motion { velocity, down, yaw_rate, .. } = self.motion;
+        let dt = now.since(self.moved).seconds().min(LONGEST);
+        self.moved = now;
+        let mut place = self.place + velocity * dt;
+        for (place, (path, velocity)) in
+            [&mut place.x, &mut place.y, &mut place.z].into_iter().zip(path.position.iter().zip(path.velocity.iter()))
+        {
+            // Behind a vehicle that cannot follow, it waits.
+            let most = AHEAD + TO_STOP * velocity.abs();
+            *place = path + (*place - path).max(-most).min(most);
+        }
+        self.place = place;
+        if yaw_rate != 0.0 {
+            let ahead = math::wrap_angle(self.yaw + yaw_rate * dt - path.yaw);
+            self.yaw = math::wrap_angle(path.yaw + ahead.clamp(-TURN_AHEAD, TURN_AHEAD));
+        }
+        place.z = down.unwrap_or(place.z);
+        let speed = (FASTER * velocity.norm()).max(path.velocity.norm()).max(SLOWEST);
+        let way_point = GuidedCommand { position: place, yaw: self.yaw, speed, ..Default::default() };
+        cockpit.fly_to(now, self.seat, way_point)
+    }
+}
