@@ -25,7 +25,7 @@ pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
             let all = fault::all();
             let fault = all.iter().find(|fault| fault.name == *name);
             if fault.is_none() && !name.is_empty() {
-                eprintln!("stampfly: there is no fault '{name}'; --list-faults lists them");
+                errln!("stampfly: there is no fault '{name}'; --list-faults lists them");
                 return Ok(ExitCode::from(USAGE));
             }
             emulated::examine(fault.map(|fault| &fault.defect), options.seed)
@@ -47,7 +47,7 @@ pub fn port_of(typed: Option<&str>) -> Option<String> {
         (None, [only]) => Some(only.clone()),
         (None, found) => {
             let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
-            eprintln!("stampfly: which port is the vehicle's? --port PORT; {found}");
+            errln!("stampfly: which port is the vehicle's? --port PORT; {found}");
             None
         }
     }
@@ -60,7 +60,7 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
         let mut typed = String::new();
         stdin().lock().read_line(&mut typed)?;
         if typed.trim() != "off" {
-            eprintln!("stampfly: with propellers on it is not examined");
+            errln!("stampfly: with propellers on it is not examined");
             return Ok(None);
         }
     }

@@ -34,7 +34,7 @@ pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
             Ok(figures) => rows.push(Row { file: file.display().to_string(), figures }),
             Err(failure) => {
                 failed = true;
-                bar.suspend(|| eprintln!("stampfly: {failure}"));
+                bar.suspend(|| errln!("stampfly: {failure}"));
             }
         }
         bar.inc(1);

@@ -1,7 +1,7 @@
 //! MCAP, for Foxglove and PlotJuggler: a channel a topic, samples as JSON with a schema that has the units.
 //!
-//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it without being told how; whoever wants it
-//! short keeps the ULog, which both programs open as well.
+//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it without being told how; the ULog is
+//! shorter, and both programs open it as well.
 
 use serde_json::{Map, Value, json};
 use stampfly_lab::flight::{Flight, Series};
@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::sync::Arc;
 
-/// Writes the topics of a flight that `wants` says, in the order of their instants.
+/// Writes the topics of a flight that `wants` says, in the order of their instants. What has no time, with a stamp of zero,
+/// comes when the recording was started.
 ///
 /// # Errors
 /// When `out` does not take it.
@@ -37,7 +38,8 @@ pub fn write<W: Write + Seek>(flight: &Flight, wants: impl Fn(&str) -> bool, out
     let mut order: Vec<_> = topics
         .iter()
         .enumerate()
-        .flat_map(|(topic, (_, series))| series.at.iter().enumerate().map(move |(row, at)| (*at, topic, row)))
+        .flat_map(|(topic, (_, series))| series.at.iter().enumerate().map(move |(row, at)| (at, topic, row)))
+        .map(|(at, topic, row)| (if flight.is_time(*at) { *at } else { flight.started }, topic, row))
         .collect();
     order.sort_unstable();
     let mut counts = vec![0_u32; topics.len()];

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use stampfly_bus::Schedule;
 use stampfly_lab::flight::{Column, Flight, Series};
 use stampfly_lab::flight_log::{self, FlightLog};
-use stampfly_log::ulog::ReadError;
+use stampfly_log::ulog::{End, ReadError};
 use stampfly_sim::recorder::Recorder;
 use stampfly_sim::vehicle::change::{Change, ChangeError};
 use stampfly_sim::vehicle::{Motion, Observer, Options, Page, PanelSpec, SetupError, Vehicle, Verdict};
@@ -135,7 +135,12 @@ pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Re
         .collect();
     let mut before = Recorder::<V>::with_log(&setup, &facts);
     let flown_before = fly::<V>(&setup, &mut before, &mut |_, _| {});
-    if before.log() != log {
+    // As far as the log goes: it may have been cut off.
+    let whole = match recorded.end {
+        End::Cut { at, .. } => at,
+        _ => log.len(),
+    };
+    if !log.get(..whole).is_some_and(|whole| before.log().starts_with(whole)) {
         return Err(ReflyError::OtherFlight { version: fact("ver_sw").cloned().unwrap_or_default() });
     }
 

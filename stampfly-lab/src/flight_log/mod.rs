@@ -1,14 +1,26 @@
 //! A flight from a ULog file, ours or anybody's.
 //!
 //! What cannot be used is left out and listed in [`FlightLog::omissions`], with its place in the file; a log that
-//! was cut off by a crash is still worth reading. Only a file that is no log at all is an error.
+//! was cut off by a crash is still worth reading, and [`FlightLog::end`] says how far it is whole. Only a file that is no log
+//! at all is an error. Formats within formats are unfolded, as pyulog does: `current.lat`, `esc[0].esc_rpm`.
+//!
+//! A file may claim what it likes: time and memory are bounded by its size and by the limits on topics, columns and names that
+//! [`Omission::Topic`] tells of.
 
-use crate::flight::{Column, Event, Flight, Meaning};
-use stampfly_log::ulog::{self, Format, Message, NAMES_PREFIX, ParameterValue, ReadError, Reader, UNITS_PREFIX};
+mod meanings;
+mod topics;
+
+use crate::flight::{Event, Flight};
+use meanings::Meanings;
+use stampfly_log::plain;
+use stampfly_log::ulog::{End, Message, ParameterValue, ReadError, Reader};
 use stampfly_types::Instant;
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
+use topics::Topics;
+
+/// Omissions that are listed one by one.
+const LISTED: usize = 100;
 
 /// Why a file could not be loaded.
 #[derive(Debug)]
@@ -47,7 +59,7 @@ impl std::error::Error for LogError {}
 pub enum Omission {
     /// A damaged place.
     Damage(ReadError),
-    /// A topic whose format has fields that are formats themselves, or is missing.
+    /// A topic whose format is missing or cannot be laid out, or that is one too many.
     Topic {
         /// The topic's name.
         topic: String,
@@ -68,15 +80,21 @@ pub enum Omission {
         /// How many.
         count: usize,
     },
+    /// Behind the hundredth: more of these.
+    More {
+        /// How many.
+        count: usize,
+    },
 }
 
 impl fmt::Display for Omission {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Damage(error) => error.fmt(f),
-            Self::Topic { topic, reason } => write!(f, "topic `{topic}` left out: {reason}"),
-            Self::ShortSamples { topic, count } => write!(f, "{count} samples of `{topic}` are too short"),
+            Self::Topic { topic, reason } => write!(f, "topic `{}` left out: {}", plain(topic), plain(reason)),
+            Self::ShortSamples { topic, count } => write!(f, "{count} samples of `{}` are too short", plain(topic)),
             Self::UnknownData { id, count } => write!(f, "{count} samples of unknown topic number {id}"),
+            Self::More { count } => write!(f, "{count} things more"),
         }
     }
 }
@@ -86,20 +104,12 @@ impl fmt::Display for Omission {
 pub struct FlightLog {
     /// The flight.
     pub flight: Flight,
-    /// The instant the log was started.
-    pub started: Instant,
+    /// How far the log is whole.
+    pub end: End,
     /// Length of each dropout in milliseconds, and the time of the newest sample before it.
     pub dropouts: Vec<(Instant, u16)>,
     /// What was left out.
     pub omissions: Vec<Omission>,
-}
-
-/// A sample's way into the columns of a topic.
-struct Subscription<'a> {
-    topic: String,
-    stamp: Option<usize>,
-    columns: Vec<ulog::Column<'a>>,
-    short: usize,
 }
 
 /// Loads a log file.
@@ -134,22 +144,23 @@ pub fn load(path: impl AsRef<Path>) -> Result<FlightLog, LogError> {
 /// # Errors
 /// When the bytes are not a log.
 pub fn parse(bytes: &[u8]) -> Result<FlightLog, ReadError> {
-    let reader = Reader::new(bytes)?;
-    let mut log = FlightLog { started: reader.started(), ..Default::default() };
-    let mut formats: BTreeMap<&str, Format<'_>> = BTreeMap::new();
-    let mut subscriptions: BTreeMap<u16, Subscription<'_>> = BTreeMap::new();
-    let mut unknown: BTreeMap<u16, usize> = BTreeMap::new();
-    let mut refused: BTreeSet<u16> = BTreeSet::new();
-    let mut meanings: BTreeMap<(String, String), Meaning> = BTreeMap::new();
-    let mut newest = log.started;
+    let mut reader = Reader::new(bytes)?;
+    let mut log = FlightLog::default();
+    log.flight.started = reader.started();
+    let mut topics = Topics::default();
+    let mut meanings = Meanings::default();
+    let mut omissions = Omissions::default();
+    let mut newest = reader.started();
 
-    for message in reader {
+    for message in reader.by_ref() {
         match message {
-            Err(error) => log.omissions.push(Omission::Damage(error)),
-            Ok(Message::Format(format)) => {
-                formats.insert(format.name, format);
+            Err(error) => omissions.push(Omission::Damage(error)),
+            Ok(Message::Format(format)) => topics.format(format),
+            Ok(Message::Info { key, value }) => {
+                if let Some((name, fact)) = meanings.take(key, value) {
+                    log.flight.info.insert(name, fact);
+                }
             }
-            Ok(Message::Info { key, value }) => note_info(&mut log.flight, &mut meanings, key, value),
             Ok(Message::Parameter { name, value }) => {
                 let value = match value {
                     ParameterValue::Float(value) => f64::from(value),
@@ -157,121 +168,47 @@ pub fn parse(bytes: &[u8]) -> Result<FlightLog, ReadError> {
                 };
                 log.flight.parameters.entry(name.to_owned()).or_default().push((newest, value));
             }
-            Ok(Message::Subscription { id, instance, topic }) => match subscribe(&formats, instance, topic) {
-                Ok((subscription, columns)) => {
-                    let series = log.flight.topics.entry(subscription.topic.clone()).or_default();
-                    if series.columns.is_empty() {
-                        series.columns = columns;
-                    }
-                    subscriptions.insert(id, subscription);
+            Ok(Message::Subscription { id, instance, topic }) => {
+                if let Err(reason) = topics.subscribe(&mut log.flight, id, instance, topic) {
+                    omissions.push(Omission::Topic { topic: topic.to_owned(), reason });
                 }
-                Err(reason) => {
-                    refused.insert(id);
-                    log.omissions.push(Omission::Topic { topic: topic.to_owned(), reason });
+            }
+            Ok(Message::Data { id, payload }) => {
+                if let Some(at) = topics.sample(&mut log.flight, id, payload) {
+                    newest = newest.max(at);
                 }
-            },
-            Ok(Message::Data { id, payload }) => match subscriptions.get_mut(&id) {
-                Some(subscription) => {
-                    if let Some(at) = subscription.take(&mut log.flight, payload) {
-                        newest = newest.max(at);
-                    }
-                }
-                None if refused.contains(&id) => {}
-                None => *unknown.entry(id).or_default() += 1,
-            },
+            }
             Ok(Message::Text { at, text, .. }) => log.flight.events.push(Event { at, text: text.to_owned() }),
             Ok(Message::Dropout { duration }) => log.dropouts.push((newest, duration)),
             Ok(_) => {}
         }
     }
 
-    for ((topic, field), meaning) in meanings {
-        let instances =
-            log.flight.topics.iter_mut().filter(|(name, _)| {
-                name.strip_prefix(&topic).is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
-            });
-        instances.for_each(|(_, series)| {
-            let known = series.meanings.entry(field.clone()).or_default();
-            if !meaning.unit.is_empty() {
-                known.unit.clone_from(&meaning.unit);
-            }
-            if !meaning.names.is_empty() {
-                known.names.clone_from(&meaning.names);
-            }
-        });
-    }
-    let short = subscriptions.into_values().filter(|subscription| subscription.short > 0);
-    log.omissions.extend(short.map(|s| Omission::ShortSamples { topic: s.topic, count: s.short }));
-    log.omissions.extend(unknown.into_iter().map(|(id, count)| Omission::UnknownData { id, count }));
+    meanings.file(&mut log.flight);
+    topics.omissions().for_each(|omission| omissions.push(omission));
+    log.omissions = omissions.listed();
+    log.end = reader.end();
     Ok(log)
 }
 
-impl Subscription<'_> {
-    /// Appends a sample to its columns and returns its stamp.
-    fn take(&mut self, flight: &mut Flight, payload: &[u8]) -> Option<Instant> {
-        let series = flight.topics.get_mut(&self.topic)?;
-        let values: Option<Vec<f64>> = self.columns.iter().map(|column| column.read(payload)).collect();
-        let stamp = self.stamp.and_then(|offset| payload.get(offset..)?.first_chunk()).copied();
-        let (Some(values), Some(stamp)) = (values, stamp) else {
-            self.short += 1;
-            return None;
-        };
-        // Two subscriptions of one topic with different formats cannot share columns; the first one has them.
-        if values.len() != series.columns.len() {
-            self.short += 1;
-            return None;
-        }
-        let at = Instant::from_micros(u64::from_le_bytes(stamp));
-        series.at.push(at);
-        series.columns.iter_mut().zip(values).for_each(|(column, value)| column.values.push(value));
-        Some(at)
-    }
+/// The first ones, and how many more there are: a file can have one in every message.
+#[derive(Default)]
+struct Omissions {
+    listed: Vec<Omission>,
+    more: usize,
 }
 
-/// Lays out a topic, or says why it cannot be done.
-fn subscribe<'a>(
-    formats: &BTreeMap<&str, Format<'a>>,
-    instance: u8,
-    topic: &str,
-) -> Result<(Subscription<'a>, Vec<Column>), String> {
-    let format = formats.get(topic).ok_or("the log has no format of this name")?;
-    let mut columns: Vec<_> = format.columns().collect::<Result<_, _>>().map_err(|error| error.to_string())?;
-    let stamp = columns.iter().position(|c| c.field == "timestamp" && c.scalar == ulog::Scalar::U64);
-    let stamp = stamp.map(|place| columns.remove(place).offset);
-    if stamp.is_none() {
-        return Err("the format has no timestamp".to_owned());
-    }
-    let named = columns.iter().map(|column| Column {
-        name: column.index.map_or_else(|| column.field.to_owned(), |index| format!("{}[{index}]", column.field)),
-        field: column.field.to_owned(),
-        values: Vec::new(),
-    });
-    let named = named.collect();
-    let topic = if instance == 0 { topic.to_owned() } else { format!("{topic}[{instance}]") };
-    Ok((Subscription { topic, stamp, columns, short: 0 }, named))
-}
-
-/// Files a fact: a unit, names of values, or anything else as text.
-fn note_info(
-    flight: &mut Flight,
-    meanings: &mut BTreeMap<(String, String), Meaning>,
-    key: ulog::Declaration<'_>,
-    value: &[u8],
-) {
-    if key.type_name == "char" {
-        let text = String::from_utf8_lossy(value);
-        if let Some(topic) = key.name.strip_prefix(UNITS_PREFIX) {
-            for (field, unit) in text.split(' ').filter_map(|pair| pair.split_once('=')) {
-                meanings.entry((topic.to_owned(), field.to_owned())).or_default().unit = unit.to_owned();
-            }
-        } else if let Some((topic, field)) = key.name.strip_prefix(NAMES_PREFIX).and_then(|rest| rest.split_once('/')) {
-            let names = text.split(' ').filter_map(|pair| pair.split_once('='));
-            let names = names.filter_map(|(name, number)| Some((name.to_owned(), number.parse().ok()?)));
-            meanings.entry((topic.to_owned(), field.to_owned())).or_default().names = names.collect();
+impl Omissions {
+    fn push(&mut self, omission: Omission) {
+        if self.listed.len() < LISTED {
+            self.listed.push(omission);
         } else {
-            flight.info.insert(key.name.to_owned(), text.into_owned());
+            self.more += 1;
         }
-    } else if let Some(number) = ulog::Scalar::from_name(key.type_name).and_then(|scalar| scalar.read(value)) {
-        flight.info.insert(key.name.to_owned(), number.to_string());
+    }
+
+    fn listed(mut self) -> Vec<Omission> {
+        self.listed.extend((self.more > 0).then_some(Omission::More { count: self.more }));
+        self.listed
     }
 }

@@ -6,6 +6,7 @@ mod calibration;
 mod consistency;
 mod estimate;
 mod flight_log;
+mod foreign_log;
 mod hostile_recordings;
 mod receiver;
 mod recorded;
