@@ -24,6 +24,8 @@ pub enum ReadErrorKind {
     Truncated,
     /// No message of ULog has this type, so the place where messages begin has been lost.
     LostFraming(u8),
+    /// Nothing that is a message begins behind this one, so bytes of it may be missing, and those of the next be in it.
+    NotFollowed,
 }
 
 /// Where and how a log is broken.
@@ -47,6 +49,9 @@ impl fmt::Display for ReadError {
             ReadErrorKind::Truncated => write!(f, "the message at byte {offset} is cut off"),
             ReadErrorKind::LostFraming(kind) => {
                 write!(f, "no message begins at byte {offset} (type {kind:#04x})")
+            }
+            ReadErrorKind::NotFollowed => {
+                write!(f, "the message at byte {offset} may be missing bytes: no message begins behind it")
             }
         }
     }
@@ -197,6 +202,11 @@ impl<'a> Iterator for Reader<'a> {
         // Types to come will be letters as well; anything else means that this is no message.
         if !kind.is_ascii_alphanumeric() {
             return self.skip(self.resume(offset), ReadErrorKind::LostFraming(kind));
+        }
+        // Flags and marks are of one length, and a log without its flags could be another than it seems.
+        let is_followed = take.0.get(2).is_none_or(u8::is_ascii_alphanumeric);
+        if !is_followed && !matches!(kind, b'B' | b'S') {
+            return self.skip(self.resume(offset), ReadErrorKind::NotFollowed);
         }
         let behind = offset + part.len() - take.0.len();
         let Some(message) = Message::parse(kind, payload) else {
