@@ -17,7 +17,8 @@ impl Sink for Bytes {
     }
 }
 
-fn log() -> Vec<u8> {
+/// A small log of ours.
+pub fn log() -> Vec<u8> {
     let topics = [
         Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
         Topic { name: "flight_status", fields: FlightStatus::FIELDS },

@@ -4,6 +4,7 @@
 mod attitude;
 mod calibration;
 mod consistency;
+mod damaged_files;
 mod estimate;
 mod flight_log;
 mod foreign_log;
