@@ -23,6 +23,8 @@ pub enum ReplayError {
     Log(ReadError),
     /// It has no activations: the program that wrote it does not record them.
     NoActivations,
+    /// It is cut off or damaged, and no activation is left.
+    NoneLeft(End),
     /// A topic or an activation does not look like this vehicle's.
     Schema(String),
     /// A parameter is unknown or out of range.
@@ -62,6 +64,7 @@ impl fmt::Display for ReplayError {
         match self {
             Self::Log(error) => write!(f, "{error}"),
             Self::NoActivations => f.write_str("the log holds no activations, so there is nothing to replay"),
+            Self::NoneLeft(end) => write!(f, "the log holds no activations that are whole: it is {end}"),
             Self::Schema(name) => write!(f, "'{name}' is not as this program writes it: another version's log?"),
             Self::Parameter(name) => write!(f, "parameter '{name}' is unknown or out of range"),
             Self::KeyFrame(error) => write!(f, "{error}"),
@@ -145,10 +148,7 @@ impl Script {
             let Ok(message) = message else {
                 is_head_damaged |= is_head;
                 frame.clear();
-                // Where nothing follows, nothing is missed.
-                if reader.offset() < log.len() {
-                    entries.push(Entry::Damaged(last));
-                }
+                damaged(&mut entries, last, reader.end());
                 continue;
             };
             match message {
@@ -178,7 +178,10 @@ impl Script {
                     is_head = false;
                     let Some(place) = places.get(&id) else { continue };
                     // The formats are this vehicle's, so a sample of another size is damage that left the framing alone.
-                    let entry = place.entry(topics, payload).unwrap_or(Entry::Damaged(last));
+                    let Some(entry) = place.entry(topics, payload) else {
+                        damaged(&mut entries, last, End::Whole);
+                        continue;
+                    };
                     match &entry {
                         Entry::Outside { at, .. } | Entry::Inside { at, .. } => last = *at,
                         Entry::Activation(record) | Entry::Refusals(record) => {
@@ -207,12 +210,22 @@ impl Script {
             }
         }
         let end = reader.end();
-        if has_activations {
-            Ok(Self { entries, start, end, is_head_damaged })
-        } else {
-            Err(ReplayError::NoActivations)
+        match has_activations {
+            true => Ok(Self { entries, start, end, is_head_damaged }),
+            false if end.is_whole() => Err(ReplayError::NoActivations),
+            false => Err(ReplayError::NoneLeft(end)),
         }
     }
+}
+
+/// Something is missing here. What was read before it may be missing bytes as well, because a message is as long as it says: only
+/// where the file ends is it known to be whole.
+fn damaged(entries: &mut Vec<Entry>, last: Instant, end: End) {
+    if matches!(end, End::Cut { .. }) || matches!(entries.last(), Some(Entry::Damaged(_))) {
+        return;
+    }
+    entries.pop();
+    entries.push(Entry::Damaged(last));
 }
 
 impl Place {
