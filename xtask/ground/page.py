@@ -9,6 +9,7 @@ Exit code 0, or an exception that says what is not as it should be.
 import argparse
 import base64
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -201,10 +202,30 @@ def opens_the_log(page: Page, folder: Path, picture) -> None:
     drop(page, b"nonsense" * 100)
     until("refused", lambda: "no ULog file" in text(page, "messages"))
     whole = file.read_bytes()
-    drop(page, whole[: len(whole) // 2 + 1])
+    # Two bytes are no message, wherever they stand.
+    drop(page, whole[: len(whole) // 2] + bytes(2))
     until("half a log is open", lambda: page.is_visible("#player"))
+    until("its end is told", lambda: re.search("the log is (cut off|damaged) at byte", text(page, "messages")))
     page.click("#vehicles button")
     until("live again", lambda: not page.is_visible("#player"))
+    for claims in ("float[4000000000] x", "none[4000000000] x", "flight_status x"):
+        told = text(page, "messages").count("flight_status left out")
+        drop(page, hostile(claims))
+        is_told = lambda told=told: text(page, "messages").count("flight_status left out") > told
+        until(f"a log that claims {claims} is left out", is_told, 2)
+
+
+def hostile(claims: str) -> bytes:
+    """A small log with a topic of the page's whose fields are these."""
+
+    def message(kind: str, payload: bytes) -> bytes:
+        return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+    formats = f"flight_status:uint64_t timestamp;{claims};", "none:"
+    log = b"ULog\x01\x12\x35\x01" + bytes(8) + message("B", bytes(40))
+    log += b"".join(message("F", text.encode()) for text in formats)
+    log += message("A", bytes(3) + b"flight_status")
+    return log + b"".join(message("D", struct.pack("<HQf", 0, 1000 * at, 1.5)) for at in range(1, 4))
 
 
 def drop(page: Page, contents: bytes) -> None:
