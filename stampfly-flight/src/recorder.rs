@@ -72,9 +72,9 @@ impl<R: Schedule, S: Sink> Recorder<R, S> {
         }
     }
 
-    /// Records a key frame, as [`encode`](crate::key_frame::encode) makes it. Ask for it between two passes of the flight
-    /// loop, with the taps drained and no activation pending. A mark stands before it: in a damaged file a reader finds
-    /// its way back there, and a replay goes on.
+    /// Records a key frame, as [`encode`](crate::key_frame::encode) makes it. Ask for it between
+    /// two passes of the flight loop, with the taps drained and no activation pending. A mark
+    /// stands before it: in a damaged file a reader finds its way back there, and a replay goes on.
     ///
     /// # Errors
     /// When the sink refuses. The writer has counted it.

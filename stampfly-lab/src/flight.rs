@@ -154,8 +154,8 @@ impl Flight {
         }
     }
 
-    /// Is this stamp a time? PX4 stamps a sample with zero when it has no time for it: in a recording that was started
-    /// later, zero says nothing about when.
+    /// Is this stamp a time? PX4 stamps a sample with zero when it has no time for it: in a
+    /// recording that was started later, zero says nothing about when.
     #[must_use]
     pub fn is_time(&self, at: Instant) -> bool {
         at != Instant::ZERO || self.started == Instant::ZERO

@@ -1,8 +1,8 @@
 //! Text from a file, for a terminal.
 //!
-//! Names and values in a log are what its writer chose. A terminal obeys some characters: escape sequences change its
-//! title or clear it, others turn the order of letters round. [`plain`] shows them instead. It is what every program of
-//! the flight stack prints foreign text with.
+//! Names and values in a log are what its writer chose. A terminal obeys some characters: escape
+//! sequences change its title or clear it, others turn the order of letters round. [`plain`] shows
+//! them instead. It is what every program of the flight stack prints foreign text with.
 
 use core::fmt::{Display, Formatter, Result, Write};
 
@@ -10,7 +10,8 @@ use core::fmt::{Display, Formatter, Result, Write};
 #[derive(Clone, Copy, Debug)]
 pub struct Plain<'a>(&'a str);
 
-/// The text with every character that a terminal would obey written as `\u001b`, which is also what JSON writes.
+/// The text with every character that a terminal would obey written as `\u001b`, which is also what
+/// JSON writes.
 ///
 /// ```
 /// use stampfly_log::plain;

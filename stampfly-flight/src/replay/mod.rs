@@ -4,10 +4,11 @@
 //! and the parameters alone every runnable is run again, in the recorded order. Everything it publishes is compared with
 //! the log, bit for bit; the first difference is named.
 //!
-//! A replay starts at power-on, or at the first key frame after a given instant. Where the log has lost something, the
-//! replay stops comparing and goes on at the next key frame; [`Replay::gaps`] counts that. A key frame that comes up while
-//! the replay runs is compared with the vehicle's state, too. A log that was cut off is repeated up to its last whole
-//! message, a damaged one in the parts that are whole; [`Replay::end`] says which it is.
+//! A replay starts at power-on, or at the first key frame after a given instant. Where the log has
+//! lost something, the replay stops comparing and goes on at the next key frame; [`Replay::gaps`]
+//! counts that. A key frame that comes up while the replay runs is compared with the vehicle's
+//! state, too. A log that was cut off is repeated up to its last whole message, a damaged one in
+//! the parts that are whole; [`Replay::end`] says which it is.
 //!
 //! Needs a heap. Not for firmware: the golden flight is a replay without one.
 
@@ -68,9 +69,10 @@ const KEY_FRAME_ROOM: usize = 64 * 1024;
 /// a parameter and the value is in range.
 ///
 /// # Errors
-/// When it is no log, is not of this vehicle, has no key frame to start from, or its writer has lost something and no key
-/// frame follows. A difference is no error: see [`Replay::difference`]. Nor is an end within a message, or damage behind
-/// something that could be repeated: see [`Replay::end`].
+/// When it is no log, is not of this vehicle, has no key frame to start from, or its writer has
+/// lost something and no key frame follows. A difference is no error: see [`Replay::difference`].
+/// Nor is an end within a message, or damage behind something that could be repeated: see
+/// [`Replay::end`].
 pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
     log: &[u8],
     config: R::Config,

@@ -177,7 +177,8 @@ impl Script {
                 Message::Data { id, payload } => {
                     is_head = false;
                     let Some(place) = places.get(&id) else { continue };
-                    // The formats are this vehicle's, so a sample of another size is damage that left the framing alone.
+                    // The formats are this vehicle's, so a sample of another size is damage that
+                    // left the framing alone.
                     let Some(entry) = place.entry(topics, payload) else {
                         damaged(&mut entries, last, End::Whole);
                         continue;
@@ -218,8 +219,8 @@ impl Script {
     }
 }
 
-/// Something is missing here. What was read before it may be missing bytes as well, because a message is as long as it says: only
-/// where the file ends is it known to be whole.
+/// Something is missing here. What was read before it may be missing bytes as well, because a
+/// message is as long as it says: only where the file ends is it known to be whole.
 fn damaged(entries: &mut Vec<Entry>, last: Instant, end: End) {
     if matches!(end, End::Cut { .. }) || matches!(entries.last(), Some(Entry::Damaged(_))) {
         return;

@@ -1,5 +1,5 @@
-//! `stampfly replay`: the flight again. Exit code 0 when it is the same as far as the log is whole, which is said, 1 when it differs
-//! or cannot be replayed.
+//! `stampfly replay`: the flight again. Exit code 0 when it is the same as far as the log is whole,
+//! which is said, 1 when it differs or cannot be replayed.
 
 use crate::command_line::arguments::ReplayOptions;
 use crate::command_line::failure::Failure;

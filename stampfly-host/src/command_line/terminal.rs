@@ -25,7 +25,8 @@ pub fn print_error(text: &str) {
     let _ = std::io::stderr().lock().write_all(lines(text).as_bytes());
 }
 
-/// The text as a terminal shows it. Names and values of files and of vehicles are in it, and none of them rules the terminal.
+/// The text as a terminal shows it. Names and values of files and of vehicles are in it, and none
+/// of them rules the terminal.
 fn lines(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for (place, line) in text.split('\n').enumerate() {

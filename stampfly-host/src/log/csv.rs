@@ -8,8 +8,9 @@ use std::io::{self, Write};
 /// Letters of a log's name, and of a topic's, in the name of a table.
 const MAX_LETTERS: usize = 80;
 
-/// Names of the files of a log's tables, as pyulog gives them: log, topic, instance. A topic's name comes from the log, which may
-/// say anything: of it only letters, digits, `_` and `-` are kept, and no two files have one name, on no file system.
+/// Names of the files of a log's tables, as pyulog gives them: log, topic, instance. A topic's name
+/// comes from the log, which may say anything: of it only letters, digits, `_` and `-` are kept,
+/// and no two files have one name, on no file system.
 ///
 /// ```
 /// use stampfly_host::log::csv::FileNames;

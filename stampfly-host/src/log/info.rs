@@ -14,7 +14,8 @@ pub struct Info {
     pub facts: BTreeMap<String, String>,
     /// Number of parameters.
     pub parameters: usize,
-    /// Instant of the first sample, s since power-on. Samples that have no time, with a stamp of zero, do not count.
+    /// Instant of the first sample, s since power-on. Samples that have no time, with a stamp of
+    /// zero, do not count.
     pub first_s: f64,
     /// Instant of the last sample, s since power-on.
     pub last_s: f64,

@@ -1,7 +1,7 @@
 //! MCAP, for Foxglove and PlotJuggler: a channel a topic, samples as JSON with a schema that has the units.
 //!
-//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it without being told how; the ULog is
-//! shorter, and both programs open it as well.
+//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it
+//! without being told how; the ULog is shorter, and both programs open it as well.
 
 use serde_json::{Map, Value, json};
 use stampfly_lab::flight::{Flight, Series};
@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::sync::Arc;
 
-/// Writes the topics of a flight that `wants` says, in the order of their instants. What has no time, with a stamp of zero,
-/// comes when the recording was started.
+/// Writes the topics of a flight that `wants` says, in the order of their instants. What has no
+/// time, with a stamp of zero, comes when the recording was started.
 ///
 /// # Errors
 /// When `out` does not take it.

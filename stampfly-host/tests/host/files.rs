@@ -1,5 +1,6 @@
-//! Files of others in the program's hands: cut off, damaged, foreign and hostile ones. What is whole is read, how far is said, and
-//! nothing that a file says rules the terminal or the file system.
+//! Files of others in the program's hands: cut off, damaged, foreign and hostile ones. What is
+//! whole is read, how far is said, and nothing that a file says rules the terminal or the file
+//! system.
 
 use crate::flown::HOP;
 use crate::foreign_log::{begun, format, hostile, message, px4_like, sample, subscribe};
@@ -8,7 +9,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-/// The longest that a command may take over a small file. A machine that does other work takes longer.
+/// The longest that a command may take over a small file. A machine that does other work takes
+/// longer.
 const PATIENCE: Duration = Duration::from_secs(if cfg!(debug_assertions) { 10 } else { 2 });
 
 fn log(folder: &Path, arguments: &[&str]) -> Output {

@@ -85,7 +85,8 @@ fn damaged_and_empty_files_are_errors_or_gaps() {
     assert!(matches!(run_again(file, Some("rover"), Samples::Again), Err(RecordError::Read(_))));
 }
 
-/// Cut off anywhere, and with any byte turned over: what is whole is run again, or an error says what is wrong.
+/// Cut off anywhere, and with any byte turned over: what is whole is run again, or an error says
+/// what is wrong.
 #[test]
 fn a_record_cut_off_or_damaged_anywhere_is_read_as_far_as_it_is_whole() {
     let mut witness = RecordOut::memory(StampFly::NAME);

@@ -1,7 +1,9 @@
-//! MATLAB files of version 5, as BROAD publishes its trials: matrices of numbers, compressed with zlib or not.
+//! MATLAB files of version 5, as BROAD publishes its trials: matrices of numbers, compressed with
+//! zlib or not.
 //!
-//! Only what is needed: little-endian, two dimensions, real numbers. Text, structures and cells are passed over. Version 7.3
-//! is HDF5, and another format. Layout after "MAT-File Format" of The MathWorks, chapter 1.
+//! Only what is needed: little-endian, two dimensions, real numbers. Text, structures and cells are
+//! passed over. Version 7.3 is HDF5, and another format. Layout after "MAT-File Format" of The
+//! MathWorks, chapter 1.
 
 use super::error::DatasetErrorKind;
 use super::npz::{Array, Arrays, Budget, Elements, broken, ordered};
@@ -44,8 +46,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Arrays, DatasetErrorKind> {
     Ok(arrays)
 }
 
-/// The next data element: its type and its bytes. What is short lies in the tag itself; all others but compressed ones end on
-/// a multiple of eight bytes.
+/// The next data element: its type and its bytes. What is short lies in the tag itself; all others
+/// but compressed ones end on a multiple of eight bytes.
 fn element<'a>(rest: &mut &'a [u8]) -> Option<(u32, &'a [u8])> {
     let (kind, behind) = rest.split_first_chunk().map(|(kind, behind)| (u32::from_le_bytes(*kind), behind))?;
     if kind > 0xffff {

@@ -8,11 +8,13 @@
 //! | [`Kind::Broad`] | MATLAB 5 as published, `data_mat/*.mat`; or NPZ with `gyr`, `acc`, `mag`, `quat`, `pos`, `movement`, `fs` | motion capture, with gaps |
 //! | [`Kind::Px4Replay`] | CSV lines `time_us,sensor,values…` | EKF2's own states, when their file lies beside it ([`load`]) |
 //!
-//! Which one a file is is found out from its content, never from its name; columns are found by name, in any order. The arrays of
-//! an NPZ are those of the published file: `cols` has the names of the columns of `data`; `gyr` to `fs` are BROAD's `imu_gyr`,
-//! `imu_acc`, `imu_mag`, `opt_quat`, `opt_pos`, `movement` and `sampling_rate`. HDF5 is not read. Everything comes out in SI units, body
-//! FRD, world NED, accelerometer as specific force, whatever the file has. Time stamps are put in order (see
-//! [`Timing`]); what had to be dropped or moved for that is counted, never hidden. What a file may unpack to is bounded.
+//! Which one a file is is found out from its content, never from its name; columns are found by
+//! name, in any order. The arrays of an NPZ are those of the published file: `cols` has the names
+//! of the columns of `data`; `gyr` to `fs` are BROAD's `imu_gyr`, `imu_acc`, `imu_mag`, `opt_quat`,
+//! `opt_pos`, `movement` and `sampling_rate`. HDF5 is not read. Everything comes out in SI units,
+//! body FRD, world NED, accelerometer as specific force, whatever the file has. Time stamps are put
+//! in order (see [`Timing`]); what had to be dropped or moved for that is counted, never hidden.
+//! What a file may unpack to is bounded.
 
 mod broad;
 mod csv;

@@ -5,7 +5,8 @@ use super::error::DatasetErrorKind;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 
-/// Bytes of all arrays of a recording, unpacked; a damaged or hostile archive may claim to have more. BROAD's have 8 million.
+/// Bytes of all arrays of a recording, unpacked; a damaged or hostile archive may claim to have
+/// more. BROAD's have 8 million.
 const MAX_BYTES: u64 = 1 << 25;
 /// Numbers in all arrays. BROAD's have one million.
 const MAX_NUMBERS: usize = 1 << 22;

@@ -1,11 +1,12 @@
 //! A flight from a ULog file, ours or anybody's.
 //!
-//! What cannot be used is left out and listed in [`FlightLog::omissions`], with its place in the file; a log that
-//! was cut off by a crash is still worth reading, and [`FlightLog::end`] says how far it is whole. Only a file that is no log
-//! at all is an error. Formats within formats are unfolded, as pyulog does: `current.lat`, `esc[0].esc_rpm`.
+//! What cannot be used is left out and listed in [`FlightLog::omissions`], with its place in the
+//! file; a log that was cut off by a crash is still worth reading, and [`FlightLog::end`] says how
+//! far it is whole. Only a file that is no log at all is an error. Formats within formats are
+//! unfolded, as pyulog does: `current.lat`, `esc[0].esc_rpm`.
 //!
-//! A file may claim what it likes: time and memory are bounded by its size and by the limits on topics, columns and names that
-//! [`Omission::Topic`] tells of.
+//! A file may claim what it likes: time and memory are bounded by its size and by the limits on
+//! topics, columns and names that [`Omission::Topic`] tells of.
 
 mod meanings;
 mod topics;

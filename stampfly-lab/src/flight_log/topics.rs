@@ -2,9 +2,10 @@
 
 use super::Omission;
 use crate::flight::{Column, Flight};
-use stampfly_log::ulog::{Format, Scalar};
+use stampfly_log::ulog::{Format, Path, Scalar};
 use stampfly_types::Instant;
 use std::collections::BTreeMap;
+use std::fmt::{self, Write};
 
 /// Topics of a log, instances counted one by one. PX4's logs have up to 300.
 const MAX_TOPICS: usize = 4_096;
@@ -51,6 +52,27 @@ struct Subscription {
     short: usize,
 }
 
+/// A name that is no longer than it may be.
+#[derive(Default)]
+struct Name(String);
+
+impl Name {
+    fn of(path: Path<'_>) -> Option<String> {
+        let mut name = Self::default();
+        write!(name, "{path}").ok().map(|()| name.0)
+    }
+}
+
+impl fmt::Write for Name {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        if self.0.len() + text.len() > MAX_NAME {
+            return Err(fmt::Error);
+        }
+        self.0 += text;
+        Ok(())
+    }
+}
+
 /// A topic laid out.
 struct Layout {
     stamp: usize,
@@ -63,7 +85,8 @@ impl<'a> Topics<'a> {
         self.formats.insert(format.name, format);
     }
 
-    /// A topic begins, or goes on under another number: instances and repetitions are as common as first ones.
+    /// A topic begins, or goes on under another number: instances and repetitions are as common as
+    /// first ones.
     pub(super) fn subscribe(&mut self, flight: &mut Flight, id: u16, instance: u8, topic: &str) -> Result<(), String> {
         self.subscriptions.insert(id, None);
         let Layout { stamp, places, columns } = self.lay_out(topic)?;
@@ -102,10 +125,9 @@ impl<'a> Topics<'a> {
                 stamp = Some(column.offset);
                 continue;
             }
-            let (name, field) = (column.path.to_string(), column.path.field().to_string());
-            if name.len() > MAX_NAME {
-                return Err(format!("a field has a name of more than {MAX_NAME} bytes"));
-            }
+            let short =
+                |path| Name::of(path).ok_or_else(|| format!("a field has a name of more than {MAX_NAME} bytes"));
+            let (name, field) = (short(column.path)?, short(column.path.field())?);
             self.columns -= 1;
             layout.places.push((column.scalar, column.offset));
             layout.columns.push(Column { name, field, values: Vec::new() });

@@ -1,5 +1,5 @@
-//! Every kind of file that is read, cut off at a thousand places and with bytes turned over: the whole part is read, or an error
-//! says what is wrong. Never a panic, and never long.
+//! Every kind of file that is read, cut off at a thousand places and with bytes turned over: the
+//! whole part is read, or an error says what is wrong. Never a panic, and never long.
 
 use crate::flight_log;
 use crate::foreign_log::px4_like;

@@ -1,4 +1,5 @@
-//! Logs as others write them, message by message: formats within formats, instances, samples without a time.
+//! Logs as others write them, message by message: formats within formats, instances, samples
+//! without a time.
 
 /// A log that was started at this instant, µs, with nothing in it.
 pub fn begun(started: u64) -> Vec<u8> {
@@ -27,8 +28,8 @@ pub fn sample(log: &mut Vec<u8>, id: u16, at: u64, rest: &[u8]) {
     message(log, b'D', &[&id.to_le_bytes(), &at.to_le_bytes(), rest]);
 }
 
-/// A log such as PX4's: set-points within one, four reports in an array, two instances of one topic under three numbers,
-/// a sample without a time, marks. Started at 1,000 s.
+/// A log such as PX4's: set-points within one, four reports in an array, two instances of one topic
+/// under three numbers, a sample without a time, marks. Started at 1,000 s.
 pub fn px4_like() -> Vec<u8> {
     const START: u64 = 1_000_000_000;
     let mut log = begun(START);
@@ -104,8 +105,12 @@ pub fn hostile() -> Vec<(&'static str, Vec<u8>)> {
             "nothing in nothing",
             of(&["x:uint64_t timestamp;a[65535] y;", "a:b[65535] y;", "b:c[65535] y;", "c:"], 60_000),
         ),
-        ("padding", of(&[&format!("x:uint64_t timestamp;p[60000] y;"), &format!("p:{padding}")], 60_000)),
+        ("padding", of(&["x:uint64_t timestamp;p[60000] y;", &format!("p:{padding}")], 60_000)),
         ("long names", of(&[&format!("x:uint64_t timestamp;float[9000] {name};")], 60_000)),
+        (
+            "long padding often",
+            of(&["x:uint64_t timestamp;p[60000] y;", &format!("p:uint8_t _padding{name};")], 60_000),
+        ),
         ("many fields", of(&[&format!("x:uint64_t timestamp;{many}")], 60_000)),
         ("names of values", names),
         ("many topics", {

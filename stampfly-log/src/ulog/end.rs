@@ -2,14 +2,15 @@
 
 use core::fmt;
 
-/// How far a log is whole. The [`Reader`](super::Reader) decides it; every program that reads logs says it with the
-/// sentence that this displays as.
+/// How far a log is whole. The [`Reader`](super::Reader) decides it; every program that reads logs
+/// says it with the sentence that this displays as.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum End {
     /// Every byte of it was read.
     #[default]
     Whole,
-    /// The file ends within a message, as after a crash or a broken download. Everything before was read.
+    /// The file ends within a message, as after a crash or a broken download. Everything before was
+    /// read.
     Cut {
         /// Byte offset of that message.
         at: usize,

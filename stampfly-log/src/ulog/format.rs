@@ -1,8 +1,9 @@
 //! Formats: what the bytes of a sample mean, as the file itself says.
 //!
-//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per scalar, arrays
-//! spread out; [`Format::unfolded`] is the same where fields may be formats themselves. To get the exact words of one of
-//! our own messages back, use [`Topic::decode`](super::Topic::decode).
+//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per
+//! scalar, arrays spread out; [`Format::unfolded`] is the same where fields may be formats
+//! themselves. To get the exact words of one of our own messages back, use
+//! [`Topic::decode`](super::Topic::decode).
 
 use core::fmt;
 

@@ -24,8 +24,8 @@
 //!   `Init=0 IdleGround=1 …`; for flags the number is the bit mask.
 //! * Each activation of a runnable is a topic `activation_…`, see [`crate::trace`].
 //!
-//! Use [`Definitions`] and [`Writer`] to write, [`Reader`] to read. Reading takes logs of any origin. A format whose
-//! fields are formats again is unfolded by [`Format::unfolded`].
+//! Use [`Definitions`] and [`Writer`] to write, [`Reader`] to read. Reading takes logs of any
+//! origin. A format whose fields are formats again is unfolded by [`Format::unfolded`].
 
 mod cursor;
 mod end;

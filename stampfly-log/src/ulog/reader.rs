@@ -1,9 +1,10 @@
 //! Reading a log of any origin, borrowed, without a way to panic or to loop for ever.
 //!
-//! The reader yields messages in file order. Damage is an item of its own and not the end: a message whose inside
-//! is broken is skipped, and after damage to the framing reading goes on at the next [`Message::Sync`] or at the
-//! next appended part. A program that wants intact logs alone stops at the first error; all others read on and say
-//! with [`Reader::end`] how far the log is whole.
+//! The reader yields messages in file order. Damage is an item of its own and not the end: a
+//! message whose inside is broken is skipped, and after damage to the framing reading goes on at
+//! the next [`Message::Sync`] or at the next appended part. A program that wants intact logs alone
+//! stops at the first error; all others read on and say with [`Reader::end`] how far the log is
+//! whole.
 
 use super::{End, FlagBits, HEADER, MAGIC, Message, SYNC_MAGIC, Take};
 use core::fmt;
@@ -24,7 +25,8 @@ pub enum ReadErrorKind {
     Truncated,
     /// No message of ULog has this type, so the place where messages begin has been lost.
     LostFraming(u8),
-    /// Nothing that is a message begins behind this one, so bytes of it may be missing, and those of the next be in it.
+    /// Nothing that is a message begins behind this one, so bytes of it may be missing, and those
+    /// of the next be in it.
     NotFollowed,
 }
 
@@ -203,7 +205,8 @@ impl<'a> Iterator for Reader<'a> {
         if !kind.is_ascii_alphanumeric() {
             return self.skip(self.resume(offset), ReadErrorKind::LostFraming(kind));
         }
-        // Flags and marks are of one length, and a log without its flags could be another than it seems.
+        // Flags and marks are of one length, and a log without its flags could be another than it
+        // seems.
         let is_followed = take.0.get(2).is_none_or(u8::is_ascii_alphanumeric);
         if !is_followed && !matches!(kind, b'B' | b'S') {
             return self.skip(self.resume(offset), ReadErrorKind::NotFollowed);

@@ -1,7 +1,8 @@
-//! Formats within formats, unfolded into scalars with names as pyulog gives them: `current.lat`, `esc[0].esc_rpm`.
+//! Formats within formats, unfolded into scalars with names as pyulog gives them: `current.lat`,
+//! `esc[0].esc_rpm`.
 //!
-//! A file may claim formats that hold themselves, or arrays without end: an unfolding ends with an error at
-//! [`MAX_DEPTH`] formats within one another and at [`MAX_STEPS`] steps.
+//! A file may claim formats that hold themselves, or arrays without end: an unfolding ends with an
+//! error at [`MAX_DEPTH`] formats within one another and at [`MAX_STEPS`] steps.
 
 use super::{Declaration, FieldError, Format, Scalar};
 use core::fmt;
@@ -10,6 +11,8 @@ use core::fmt;
 pub(super) const MAX_DEPTH: usize = 6;
 /// Declarations and elements that one unfolding looks at. A sample has at most 65,535 bytes.
 pub(super) const MAX_STEPS: usize = 1 << 16;
+/// So many letters of a declaration are a step more.
+const LETTERS: usize = 64;
 
 /// The way to a scalar through its formats. Displays as `esc[0].esc_rpm`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,8 +99,9 @@ enum Kind<'a> {
 }
 
 impl<'a> Format<'a> {
-    /// One column per scalar, in byte order, padding left out, with the fields of formats that `formats` finds in their
-    /// place. Ends after the first error, because the offsets behind a field of unknown size are unknown.
+    /// One column per scalar, in byte order, padding left out, with the fields of formats that
+    /// `formats` finds in their place. Ends after the first error, because the offsets behind a
+    /// field of unknown size are unknown.
     ///
     /// ```
     /// use stampfly_log::ulog::Format;
@@ -121,7 +125,8 @@ impl<'a> Format<'a> {
 }
 
 impl<'a, F: Fn(&str) -> Option<Format<'a>>> Unfolded<'a, F> {
-    /// Declarations and elements looked at so far: what the unfolding has cost.
+    /// Declarations and elements looked at so far, long declarations several times: what the
+    /// unfolding has cost.
     #[must_use]
     pub const fn steps(&self) -> usize {
         self.steps
@@ -177,6 +182,7 @@ impl<'a, F: Fn(&str) -> Option<Format<'a>>> Iterator for Unfolded<'a, F> {
                 None => {
                     let (text, rest) = open.rest.split_once(';').unwrap_or((open.rest, ""));
                     open.rest = rest;
+                    self.steps += text.len() / LETTERS;
                     if text.trim_ascii().is_empty() {
                         continue;
                     }
@@ -215,7 +221,7 @@ mod tests {
             |name: &str| formats.iter().find(|(known, _)| *known == name).map(|(name, fields)| Format { name, fields });
         let mut columns = find("own").expect("a format").unfolded(find);
         let last = columns.by_ref().last().expect("an item");
-        assert!(columns.steps() <= MAX_STEPS + 1);
+        assert!(columns.steps() <= MAX_STEPS + 1_024);
         last.map(|column| column.path.to_string()).map_err(|error| error.to_string())
     }
 

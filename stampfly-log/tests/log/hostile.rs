@@ -200,7 +200,8 @@ fn the_end_says_what_was_not_read() {
     assert_eq!(end(&damaged), End::Damaged { at, places: 2, skipped });
     let sentence = format!("damaged at byte {at} and in 1 places more: {skipped} bytes were passed over");
     assert_eq!(end(&damaged).to_string(), sentence);
-    // Zeros at the end, as a disk leaves them, are damage: no message begins so, and the last one before may be part of it.
+    // Zeros at the end, as a disk leaves them, are damage: no message begins so, and the last one
+    // before may be part of it.
     let (zeros, last) = ([&log[..], &[0; 100]].concat(), whole[whole.len() - 2]);
     assert_eq!(end(&zeros), End::Damaged { at: last, places: 1, skipped: zeros.len() - last });
 }

@@ -1,7 +1,8 @@
 // A ULog file as a vehicle: its topics, the sample of each at a time, frames of the whole flight.
 //
-// What is whole, where reading goes on behind damage, how formats within formats are named and how much of a file may be laid out
-// are as in `stampfly_log::ulog` and `stampfly_lab::flight_log`, and so is the sentence that says how far a log is whole.
+// What is whole, where reading goes on behind damage, how formats within formats are named and how
+// much of a file may be laid out are as in `stampfly_log::ulog` and `stampfly_lab::flight_log`, and
+// so is the sentence that says how far a log is whole.
 
 const MAGIC = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
 const SYNC_MARK = [8, 0, 0x53, 0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
@@ -10,7 +11,8 @@ const TYPES = {
   uint16_t: [2, 'getUint16'], int32_t: [4, 'getInt32'], uint32_t: [4, 'getUint32'], float: [4, 'getFloat32'],
   double: [8, 'getFloat64'], int64_t: [8, 'getBigInt64'], uint64_t: [8, 'getBigUint64'],
 };
-// A small file may claim much: topics, numbers and fields of all topics, steps to lay them out, formats within one another, letters.
+// A small file may claim much: topics, numbers and fields of all topics, steps to lay them out,
+// formats within one another, letters.
 const MOST = { topics: 4096, columns: 65536, fields: 16384, steps: 1 << 20, stepsOfOne: 65536, depth: 6, name: 255, sample: 65535 };
 
 /** Where messages are, one by one; `end` says how far the file is whole. */
@@ -198,15 +200,16 @@ const layOut = (log, name) => {
 const unfolded = (log, name, fields) => {
   const layout = { format: name, key: '', fields: [], columns: 0, stamp: -1, size: 0, hasMeaning: false };
   let offset = 0, steps = MOST.stepsOfOne;
-  const step = () => {
-    if (!steps || !log.left.steps) throw new Error('its fields are too many');
-    steps--;
-    log.left.steps--;
+  const step = (count) => {
+    steps -= count;
+    log.left.steps = Math.max(log.left.steps - count, 0);
+    if (steps < 0 || !log.left.steps) throw new Error('its fields are too many');
   };
   const unfold = (text, prefix, depth) => {
     if (depth > MOST.depth) throw new Error('a format holds itself, or formats are too deep in one another');
+    step(1 + text.length / 64); // So many letters cost as much as a field.
     for (const part of text.split(';')) {
-      step();
+      step(1);
       if (!part.trim()) continue;
       const declared = parseDeclaration(part);
       if (!declared) throw new Error(`${part.slice(0, 100)} is no field declaration`);
@@ -216,7 +219,7 @@ const unfolded = (log, name, fields) => {
         const inner = log.formats.get(type);
         if (!inner) throw new Error(`type ${type.slice(0, 100)} is neither a basic one nor a format of the log`);
         for (let index = 0; index < (count ?? 1); index++) {
-          step();
+          step(1);
           unfold(inner.fields, `${path}${count === undefined ? '' : `[${index}]`}.`, depth + 1);
         }
         continue;
