@@ -111,6 +111,8 @@ pub struct Reflown<O> {
     pub outcomes: [O; 2],
     /// How far apart the courses are.
     pub apart: Apart,
+    /// How far the log of the flight was whole.
+    pub end: End,
     flight: Flight,
 }
 
@@ -164,7 +166,7 @@ pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Re
     let FlightLog { mut flight, .. } = flight_log::parse(&log).map_err(ReflyError::Log)?;
     let apart = compare(&mut flight, &recorded.flight, V::PAGE.observers, changed_at);
     let outcomes = [flown_before, flown].map(|Flown { outcome, .. }| outcome);
-    Ok(Reflown { changed_at, parameters: parameters.to_vec(), log, outcomes, apart, flight })
+    Ok(Reflown { changed_at, parameters: parameters.to_vec(), log, outcomes, apart, end: recorded.end, flight })
 }
 
 fn config<V: Vehicle>(setup: &V::Setup) -> <V::Runnables as Schedule>::Config {
@@ -272,6 +274,7 @@ impl<O: Verdict> Reflown<O> {
             "changed": self.parameters, "changed_at_s": self.changed_at.as_micros() as f64 * 1e-6,
             "apart_since_s": self.apart.since_s, "farthest_m": self.apart.farthest_m,
             "farthest_at_s": self.apart.farthest_at_s, "at_end_m": self.apart.at_end_m,
+            "whole": self.end.is_whole(), "end": self.end.to_string(),
             "before": before, "now": now,
         })
     }
@@ -310,6 +313,9 @@ impl<O: Verdict> fmt::Display for Reflown<O> {
         }
         for (what, outcome) in ["as it flew", "now"].into_iter().zip(&self.outcomes) {
             writeln!(f, "{what:<12}{}", outcome.sentence())?;
+        }
+        if !self.end.is_whole() {
+            writeln!(f, "the log is {}", self.end)?;
         }
         Ok(())
     }

@@ -217,6 +217,8 @@ mod again {
         assert!(matches!(error, ReflyError::Over), "{error}");
         let error = again(&HOP.log, "eskf.gate=4").expect_err("as a board's own log, it names no world");
         assert!(matches!(error, ReflyError::NoWorld) && error.to_string().contains("stampfly replay"), "{error}");
+        let cut = again(&log[..log.len() - 1], "position.pos.kp=1").expect("a log that was cut off is flown again");
+        assert!(!cut.end.is_whole() && cut.to_string().contains("the log is cut off at byte"), "{cut}");
         let mut other = log.clone();
         let place = other.windows(5).position(|bytes| bytes == b"seed3").expect("a fact") + 4;
         other[place] = b'4';

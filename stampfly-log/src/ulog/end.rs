@@ -45,7 +45,8 @@ impl fmt::Display for End {
                 write!(f, "damaged at byte {at}: {skipped} bytes were passed over")
             }
             Self::Damaged { at, places, skipped } => {
-                write!(f, "damaged at byte {at} and in {} places more: {skipped} bytes were passed over", places - 1)
+                let more = places.saturating_sub(1);
+                write!(f, "damaged at byte {at} and in {more} places more: {skipped} bytes were passed over")
             }
         }
     }
