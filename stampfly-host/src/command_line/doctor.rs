@@ -2,11 +2,12 @@
 
 use crate::command_line::arguments::DoctorOptions;
 use crate::command_line::failure::Failure;
+use crate::command_line::terminal::Screen;
 use crate::doctor::console::Serial;
 use crate::doctor::newcomer::Newcomer;
 use crate::doctor::{Chart, emulated, examine};
 use stampfly_board::simulation::bench::fault;
-use std::io::{BufRead, stdin, stdout};
+use std::io::{BufRead, stdin};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -70,7 +71,7 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
         path,
         port: None,
         keys: stdin().lock(),
-        screen: stdout().lock(),
+        screen: Screen,
         begun: Instant::now(),
         transcript: String::new(),
     };

@@ -20,6 +20,20 @@ pub fn print(text: &str) {
     let _ = out.write_all(lines(text).as_bytes()).and_then(|()| out.flush());
 }
 
+/// Standard output, for those who write pieces of text.
+pub struct Screen;
+
+impl Write for Screen {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        print(&String::from_utf8_lossy(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Prints text on standard error.
 pub fn print_error(text: &str) {
     let _ = std::io::stderr().lock().write_all(lines(text).as_bytes());
@@ -30,7 +44,8 @@ pub fn print_error(text: &str) {
 fn lines(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for (place, line) in text.split('\n').enumerate() {
-        // A string takes everything.
+        // Lines of vehicles end with both. A string takes everything.
+        let line = line.strip_suffix('\r').unwrap_or(line);
         let _ = write!(shown, "{}{}", if place == 0 { "" } else { "\n" }, plain(line));
     }
     shown
@@ -42,6 +57,6 @@ mod tests {
 
     #[test]
     fn a_terminal_gets_lines_and_nothing_that_it_obeys() {
-        assert_eq!(lines("a\x1b[2J\nb\r\n\n"), "a\\u001b[2J\nb\\u000d\n\n");
+        assert_eq!(lines("a\x1b[2J\nb\rc\r\n\n"), "a\\u001b[2J\nb\\u000dc\n\n");
     }
 }

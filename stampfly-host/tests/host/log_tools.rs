@@ -82,7 +82,7 @@ fn what_has_no_time_does_not_say_when_a_log_begins() {
     let messages: Vec<_> = ::mcap::MessageStream::new(&bytes).expect("an MCAP").map(|m| m.expect("whole")).collect();
     assert_eq!(messages.len(), 20 + 20 + 20 + 30);
     assert_eq!(messages.iter().map(|message| message.log_time).min(), Some(1_000_000_000_000));
-    let triplet = messages.iter().filter(|message| message.channel.topic == "position_setpoint_triplet").last();
+    let triplet = messages.iter().rfind(|message| message.channel.topic == "position_setpoint_triplet");
     let sample: Value = serde_json::from_slice(&triplet.expect("a message").data).expect("JSON");
     assert_eq!((sample["current.lat"].as_f64(), sample["previous.valid"].as_f64()), (Some(19.0), Some(1.0)));
 }
