@@ -169,7 +169,7 @@ def kills(page: Page) -> None:
     until("motors off", lambda: text(page, "armed") == "disarmed", 2)
 
 
-def opens_the_log(page: Page, folder: Path, picture) -> None:
+def opens_the_log(page: Page, program: str, folder: Path, picture) -> None:
     page.click("#tab-log")
     with page.expect_download() as waiting:
         page.click("#download")
@@ -202,12 +202,17 @@ def opens_the_log(page: Page, folder: Path, picture) -> None:
     drop(page, b"nonsense" * 100)
     until("refused", lambda: "no ULog file" in text(page, "messages"))
     whole = file.read_bytes()
+    middle = len(whole) // 2
     # Two bytes are no message, wherever they stand.
-    drop(page, whole[: len(whole) // 2] + bytes(2))
-    until("half a log is open", lambda: page.is_visible("#player"))
-    until("its end is told", lambda: re.search("the log is (cut off|damaged) at byte", text(page, "messages")))
-    page.click("#vehicles button")
-    until("live again", lambda: not page.is_visible("#player"))
+    for part in (whole[:middle] + bytes(2), whole[:middle] + whole[middle + 3 :]):
+        drop(page, part)
+        until("half a log is open", lambda: page.is_visible("#player"))
+        file.write_bytes(part)
+        said = subprocess.run([program, "log", "info", file], capture_output=True, text=True, check=True).stdout
+        end = next(line for line in said.splitlines() if line.startswith("the log is "))
+        until(f"the page says as the program: {end}", lambda end=end: end in text(page, "messages"))
+        page.click("#vehicles button")
+        until("live again", lambda: not page.is_visible("#player"))
     for claims in ("float[4000000000] x", "none[4000000000] x", "flight_status x"):
         told = text(page, "messages").count("flight_status left out")
         drop(page, hostile(claims))
@@ -405,7 +410,7 @@ def look(browser, address: str, options, folder: Path) -> None:
     flies(page, picture)
     injects_a_fault(page, picture)
     kills(page)
-    opens_the_log(page, folder, picture)
+    opens_the_log(page, options.program[0], folder, picture)
     shows_every_topic(page, picture)
     asks_the_console(page)
     calibrates(page, picture)
