@@ -9,7 +9,7 @@
 //! | one sample | published, by anybody |
 //! | one activation | has read its inputs |
 //! | the same activation again, with what was refused | has finished, and a queue was full |
-//! | a key frame | the caller asks for one |
+//! | a mark to find the way back, and a key frame | the caller asks for one |
 //! | a dropout mark | the sink, or a tap, has lost something before |
 //!
 //! For a log of the last seconds in memory, see the black box.
@@ -72,12 +72,15 @@ impl<R: Schedule, S: Sink> Recorder<R, S> {
         }
     }
 
-    /// Records a key frame, as [`encode`](crate::key_frame::encode) makes it. Ask for it between two passes of the flight
-    /// loop, with the taps drained and no activation pending.
+    /// Records a key frame, as [`encode`](crate::key_frame::encode) makes it. Ask for it between
+    /// two passes of the flight loop, with the taps drained and no activation pending. A mark
+    /// stands before it: in a damaged file a reader finds its way back there, and a replay goes on.
     ///
     /// # Errors
     /// When the sink refuses. The writer has counted it.
     pub fn key_frame(&mut self, now: Instant, frame: &[u8]) -> Result<(), WriteError<S::Error>> {
+        // Without the mark the frame is still worth having.
+        let _ = self.log.sync();
         self.log.blob(now, KEY_FRAME, frame)
     }
 

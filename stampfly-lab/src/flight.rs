@@ -5,14 +5,15 @@
 
 use stampfly_types::{FieldInfo, FieldKind, Instant, Message, Value, leaves};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What a field of numbers means.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Meaning {
     /// Unit; empty when dimensionless or unknown.
     pub unit: String,
-    /// Names of values; of bit masks, for a set of flags.
-    pub names: Vec<(String, u32)>,
+    /// Names of values; of bit masks, for a set of flags. All instances of a topic share them.
+    pub names: Arc<[(String, u32)]>,
 }
 
 /// One scalar over time.
@@ -52,7 +53,7 @@ impl Series {
                 _ => &[],
             };
             let unit = leaf.unit.to_owned();
-            let names: Vec<_> = names.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
+            let names: Arc<[_]> = names.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
             if !unit.is_empty() || !names.is_empty() {
                 series.meanings.insert(field, Meaning { unit, names });
             }
@@ -125,6 +126,8 @@ pub struct Event {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
+    /// The instant its recording was started.
+    pub started: Instant,
     /// Topics by name.
     pub topics: BTreeMap<String, Series>,
     /// Facts about the flight.
@@ -151,10 +154,17 @@ impl Flight {
         }
     }
 
-    /// The earliest and the latest stamp of any topic.
+    /// Is this stamp a time? PX4 stamps a sample with zero when it has no time for it: in a
+    /// recording that was started later, zero says nothing about when.
+    #[must_use]
+    pub fn is_time(&self, at: Instant) -> bool {
+        at != Instant::ZERO || self.started == Instant::ZERO
+    }
+
+    /// The earliest and the latest stamp of any topic, among those that are times.
     #[must_use]
     pub fn span(&self) -> Option<(Instant, Instant)> {
-        let stamps = || self.topics.values().flat_map(|series| &series.at);
+        let stamps = || self.topics.values().flat_map(|series| &series.at).filter(|at| self.is_time(**at));
         Some((*stamps().min()?, *stamps().max()?))
     }
 }

@@ -9,6 +9,7 @@
 //! | [`csv`] | one type of message as CSV that reads back bit for bit | small logs for tools and people |
 //! | [`trace`] | what each activation of a runnable saw | when a log must replay bit for bit |
 //! | [`hash`] | one 64-bit number for a whole flight | to ask whether two flights were the same |
+//! | [`plain()`] | text from a file without what a terminal obeys | to print a name that a log's writer chose |
 //!
 //! Nothing here does input or output, allocates or reads a clock: the writer hands finished messages to a
 //! [`ulog::Sink`], the reader walks over a byte slice. Samples are written from the 32-bit words of
@@ -44,10 +45,12 @@ extern crate std;
 
 pub mod csv;
 pub mod hash;
+mod plain;
 pub mod trace;
 pub mod ulog;
 
 pub use hash::FlightHash;
+pub use plain::{Plain, plain};
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;
 pub use trace::ActivationTopic;

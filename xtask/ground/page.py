@@ -9,6 +9,7 @@ Exit code 0, or an exception that says what is not as it should be.
 import argparse
 import base64
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -168,7 +169,7 @@ def kills(page: Page) -> None:
     until("motors off", lambda: text(page, "armed") == "disarmed", 2)
 
 
-def opens_the_log(page: Page, folder: Path, picture) -> None:
+def opens_the_log(page: Page, program: str, folder: Path, picture) -> None:
     page.click("#tab-log")
     with page.expect_download() as waiting:
         page.click("#download")
@@ -201,10 +202,35 @@ def opens_the_log(page: Page, folder: Path, picture) -> None:
     drop(page, b"nonsense" * 100)
     until("refused", lambda: "no ULog file" in text(page, "messages"))
     whole = file.read_bytes()
-    drop(page, whole[: len(whole) // 2 + 1])
-    until("half a log is open", lambda: page.is_visible("#player"))
-    page.click("#vehicles button")
-    until("live again", lambda: not page.is_visible("#player"))
+    middle = len(whole) // 2
+    # Two bytes are no message, wherever they stand.
+    for part in (whole[:middle] + bytes(2), whole[:middle] + whole[middle + 3 :]):
+        drop(page, part)
+        until("half a log is open", lambda: page.is_visible("#player"))
+        file.write_bytes(part)
+        said = subprocess.run([program, "log", "info", file], capture_output=True, text=True, check=True).stdout
+        end = next(line for line in said.splitlines() if line.startswith("the log is "))
+        until(f"the page says as the program: {end}", lambda end=end: end in text(page, "messages"))
+        page.click("#vehicles button")
+        until("live again", lambda: not page.is_visible("#player"))
+    for claims in ("float[4000000000] x", "none[4000000000] x", "flight_status x"):
+        told = text(page, "messages").count("flight_status left out")
+        drop(page, hostile(claims))
+        is_told = lambda told=told: text(page, "messages").count("flight_status left out") > told
+        until(f"a log that claims {claims} is left out", is_told, 2)
+
+
+def hostile(claims: str) -> bytes:
+    """A small log with a topic of the page's whose fields are these."""
+
+    def message(kind: str, payload: bytes) -> bytes:
+        return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+    formats = f"flight_status:uint64_t timestamp;{claims};", "none:"
+    log = b"ULog\x01\x12\x35\x01" + bytes(8) + message("B", bytes(40))
+    log += b"".join(message("F", text.encode()) for text in formats)
+    log += message("A", bytes(3) + b"flight_status")
+    return log + b"".join(message("D", struct.pack("<HQf", 0, 1000 * at, 1.5)) for at in range(1, 4))
 
 
 def drop(page: Page, contents: bytes) -> None:
@@ -384,7 +410,7 @@ def look(browser, address: str, options, folder: Path) -> None:
     flies(page, picture)
     injects_a_fault(page, picture)
     kills(page)
-    opens_the_log(page, folder, picture)
+    opens_the_log(page, options.program[0], folder, picture)
     shows_every_topic(page, picture)
     asks_the_console(page)
     calibrates(page, picture)

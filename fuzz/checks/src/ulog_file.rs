@@ -1,7 +1,7 @@
 //! Bytes of a log file.
 
 use stampfly_log::ActivationTopic;
-use stampfly_log::ulog::{Format, Message, Reader, Topic};
+use stampfly_log::ulog::{End, Format, Message, Reader, Topic};
 use stampfly_types::Message as _;
 use stampfly_types::messages::{FlightStatus, ImuData, StateEstimate};
 
@@ -24,6 +24,11 @@ pub fn ulog(data: &[u8]) {
         match item {
             Ok(Message::Format(format)) => {
                 assert!(format.columns().take(COLUMNS).count() < COLUMNS);
+                // Those that were declared before, and itself.
+                let find = |name: &str| formats.iter().chain([&format]).rev().take(8).find(|known| known.name == name);
+                let mut unfolded = format.unfolded(|name| find(name).copied());
+                assert!(unfolded.by_ref().take(COLUMNS).count() < COLUMNS);
+                assert!(unfolded.steps() < COLUMNS + 1_024, "{} steps", unfolded.steps());
                 let _ = format.declarations().filter(Result::is_ok).count();
                 let _ = TOPICS.iter().filter(|topic| topic.is_format(&format)).count();
                 formats.push(format);
@@ -32,6 +37,11 @@ pub fn ulog(data: &[u8]) {
             Ok(_) => {}
             Err(error) => assert!(error.offset < data.len()),
         }
+    }
+    match reader.end() {
+        End::Whole => {}
+        End::Cut { at, rest } => assert_eq!(at + rest, data.len()),
+        End::Damaged { at, places, skipped } => assert!(places > 0 && at + skipped <= data.len()),
     }
 }
 

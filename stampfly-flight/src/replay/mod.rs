@@ -4,9 +4,11 @@
 //! and the parameters alone every runnable is run again, in the recorded order. Everything it publishes is compared with
 //! the log, bit for bit; the first difference is named.
 //!
-//! A replay starts at power-on, or at the first key frame after a given instant. Where the log has lost something, the
-//! replay stops comparing and goes on at the next key frame; [`Replay::gaps`] counts that. A key frame that comes up while
-//! the replay runs is compared with the vehicle's state, too.
+//! A replay starts at power-on, or at the first key frame after a given instant. Where the log has
+//! lost something, the replay stops comparing and goes on at the next key frame; [`Replay::gaps`]
+//! counts that. A key frame that comes up while the replay runs is compared with the vehicle's
+//! state, too. A log that was cut off is repeated up to its last whole message, a damaged one in
+//! the parts that are whole; [`Replay::end`] says which it is.
 //!
 //! Needs a heap. Not for firmware: the golden flight is a replay without one.
 
@@ -25,7 +27,7 @@ use compare::Comparison;
 use script::{Entry, Script};
 use serde::{Serialize, de::DeserializeOwned};
 use stampfly_bus::{PublishWords, Schedule, Taps, TopicTable};
-use stampfly_log::ulog::ParameterValue;
+use stampfly_log::ulog::{End, ParameterValue};
 use stampfly_types::{ActivationRecord, Duration, Instant};
 
 /// What came out of a replay that could be made.
@@ -45,6 +47,8 @@ pub struct Replay {
     pub skipped: u64,
     /// Time between the first and the last activation that were repeated.
     pub duration: Duration,
+    /// How far the log is whole. What is behind its end was not repeated.
+    pub end: End,
 }
 
 /// How to replay.
@@ -65,8 +69,10 @@ const KEY_FRAME_ROOM: usize = 64 * 1024;
 /// a parameter and the value is in range.
 ///
 /// # Errors
-/// When the log cannot be read, is not of this vehicle, has no key frame to start from, or has lost something and no key
-/// frame follows. A difference is no error: see [`Replay::difference`].
+/// When it is no log, is not of this vehicle, has no key frame to start from, or its writer has
+/// lost something and no key frame follows. A difference is no error: see [`Replay::difference`].
+/// Nor is an end within a message, or damage behind something that could be repeated: see
+/// [`Replay::end`].
 pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
     log: &[u8],
     config: R::Config,
@@ -78,8 +84,8 @@ pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
     let mut player = Player::<R> {
         config,
         start: script.start,
-        is_thinned: options.is_thinned,
-        outcome: Replay::default(),
+        is_thinned: options.is_thinned || script.is_head_damaged,
+        outcome: Replay { end: script.end, ..Replay::default() },
         first: None,
         state: None,
     };
@@ -94,7 +100,8 @@ pub fn replay<R: Schedule + Serialize + DeserializeOwned>(
         let Some((lost_at, why)) = player.play(&script.entries, from, frame)? else { break };
         player.outcome.gaps += 1;
         place = player.next_key_frame(&script.entries, lost_at, None)?;
-        if place.is_none() {
+        let is_damage = !script.end.is_whole() || matches!(why, ReplayError::Damaged { .. });
+        if place.is_none() && !(is_damage && player.outcome.activations > 0) {
             return Err(why);
         }
     }
@@ -197,6 +204,7 @@ impl<R: Schedule + Serialize + DeserializeOwned> Player<R> {
                     }
                 }
                 Entry::Lost(at) => return Ok(Some((place + 1, ReplayError::Dropout { at: *at }))),
+                Entry::Damaged(at) => return Ok(Some((place + 1, ReplayError::Damaged { at: *at }))),
             }
             if self.outcome.difference.is_some() {
                 return Ok(None);

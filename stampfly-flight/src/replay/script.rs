@@ -9,20 +9,22 @@ use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
-use stampfly_bus::{Schedule, TopicTable};
+use stampfly_bus::{Schedule, TopicInfo, TopicTable};
 use stampfly_log::ActivationTopic;
 use stampfly_log::trace::TOPIC_PREFIX;
-use stampfly_log::ulog::{Message, ParameterValue, ReadError, Reader, Schema, Topic};
+use stampfly_log::ulog::{End, Message, ParameterValue, ReadError, Reader, Schema, Stamp, Topic};
 use stampfly_types::{ActivationRecord, Instant};
 
 /// Why a log cannot be replayed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// The file is no intact ULog.
+    /// The file is no ULog.
     Log(ReadError),
     /// It has no activations: the program that wrote it does not record them.
     NoActivations,
+    /// It is cut off or damaged, and no activation is left.
+    NoneLeft(End),
     /// A topic or an activation does not look like this vehicle's.
     Schema(String),
     /// A parameter is unknown or out of range.
@@ -50,6 +52,11 @@ pub enum ReplayError {
         /// The stamp of the last sample or activation before it.
         at: Instant,
     },
+    /// The log is damaged before there was anything to repeat, and no key frame follows.
+    Damaged {
+        /// The stamp of the last sample or activation before it.
+        at: Instant,
+    },
 }
 
 impl fmt::Display for ReplayError {
@@ -57,6 +64,7 @@ impl fmt::Display for ReplayError {
         match self {
             Self::Log(error) => write!(f, "{error}"),
             Self::NoActivations => f.write_str("the log holds no activations, so there is nothing to replay"),
+            Self::NoneLeft(end) => write!(f, "the log holds no activations that are whole: it is {end}"),
             Self::Schema(name) => write!(f, "'{name}' is not as this program writes it: another version's log?"),
             Self::Parameter(name) => write!(f, "parameter '{name}' is unknown or out of range"),
             Self::KeyFrame(error) => write!(f, "{error}"),
@@ -68,6 +76,7 @@ impl fmt::Display for ReplayError {
                 write!(f, "the log has a gap: a sample of {topic} before {at} is not in it")
             }
             Self::Dropout { at } => write!(f, "the log has a gap: a dropout after {at}"),
+            Self::Damaged { at } => write!(f, "the log is damaged after {at}, and no key frame follows"),
         }
     }
 }
@@ -86,13 +95,19 @@ pub(super) enum Entry {
     Refusals(ActivationRecord),
     /// The state of the vehicle.
     KeyFrame(Vec<u8>),
-    /// Something is missing here.
+    /// Something is missing here: the writer could not keep up.
     Lost(Instant),
+    /// Something is missing here: the file is damaged.
+    Damaged(Instant),
 }
 
 pub(super) struct Script {
     pub(super) entries: Vec<Entry>,
     pub(super) start: Instant,
+    /// How far the log is whole.
+    pub(super) end: End,
+    /// Is something damaged before the first sample? Then a topic may be missing.
+    pub(super) is_head_damaged: bool,
 }
 
 /// What the data of one subscription is.
@@ -126,10 +141,17 @@ impl Script {
         let mut frame = Vec::new();
         let mut last = Instant::ZERO;
         let mut has_activations = false;
-        let reader = Reader::new(log).map_err(ReplayError::Log)?;
+        let (mut is_head, mut is_head_damaged) = (true, false);
+        let mut reader = Reader::new(log).map_err(ReplayError::Log)?;
         let start = reader.started();
-        for message in reader {
-            match message.map_err(ReplayError::Log)? {
+        while let Some(message) = reader.next() {
+            let Ok(message) = message else {
+                is_head_damaged |= is_head;
+                frame.clear();
+                damaged(&mut entries, last, reader.end());
+                continue;
+            };
+            match message {
                 Message::Format(format) => {
                     if let Some(count) = ActivationTopic::inputs_of(&format) {
                         inputs.insert(format.name.to_owned(), count);
@@ -152,32 +174,25 @@ impl Script {
                         places.insert(id, Place::Activation { index: index as u8, inputs: *count });
                     }
                 }
-                Message::Data { id, payload } => match places.get(&id) {
-                    Some(Place::Topic(place, topic)) => {
-                        let mut words = vec![0; topics[*place].words];
-                        let stamp = topic.decode(payload, &mut words);
-                        let stamp = stamp.ok_or_else(|| ReplayError::Schema(topic.name.to_owned()))?;
-                        last = stamp.at;
-                        let (topic, at, generation) = (*place, stamp.at, stamp.generation);
-                        entries.push(match topics[topic].is_outside {
-                            true => Entry::Outside { topic, at, generation, words },
-                            false => Entry::Inside { topic, at, generation, words },
-                        });
+                Message::Data { id, payload } => {
+                    is_head = false;
+                    let Some(place) = places.get(&id) else { continue };
+                    // The formats are this vehicle's, so a sample of another size is damage that
+                    // left the framing alone.
+                    let Some(entry) = place.entry(topics, payload) else {
+                        damaged(&mut entries, last, End::Whole);
+                        continue;
+                    };
+                    match &entry {
+                        Entry::Outside { at, .. } | Entry::Inside { at, .. } => last = *at,
+                        Entry::Activation(record) | Entry::Refusals(record) => {
+                            last = record.now;
+                            has_activations = true;
+                        }
+                        _ => {}
                     }
-                    Some(Place::Activation { index, inputs }) => {
-                        let record = ActivationTopic::decode(payload, *inputs).filter(|record| record.index == *index);
-                        let name = || R::ACTIVATIONS[usize::from(*index)].name.to_owned();
-                        let record = record.ok_or_else(|| ReplayError::Schema(name()))?;
-                        last = record.now;
-                        has_activations = true;
-                        entries.push(if record.refused == 0 {
-                            Entry::Activation(record)
-                        } else {
-                            Entry::Refusals(record)
-                        });
-                    }
-                    None => {}
-                },
+                    entries.push(entry);
+                }
                 Message::MultiInfo { continued, key, value } if key.name == KEY_FRAME => {
                     if !continued {
                         frame.clear();
@@ -195,6 +210,42 @@ impl Script {
                 _ => {}
             }
         }
-        if has_activations { Ok(Self { entries, start }) } else { Err(ReplayError::NoActivations) }
+        let end = reader.end();
+        match has_activations {
+            true => Ok(Self { entries, start, end, is_head_damaged }),
+            false if end.is_whole() => Err(ReplayError::NoActivations),
+            false => Err(ReplayError::NoneLeft(end)),
+        }
+    }
+}
+
+/// Something is missing here. What was read before it may be missing bytes as well, because a
+/// message is as long as it says: only where the file ends is it known to be whole.
+fn damaged(entries: &mut Vec<Entry>, last: Instant, end: End) {
+    if matches!(end, End::Cut { .. }) || matches!(entries.last(), Some(Entry::Damaged(_))) {
+        return;
+    }
+    entries.pop();
+    entries.push(Entry::Damaged(last));
+}
+
+impl Place {
+    /// What a payload says; `None` when it is not of this place.
+    fn entry(&self, topics: &'static [TopicInfo], payload: &[u8]) -> Option<Entry> {
+        match *self {
+            Self::Topic(topic, ref layout) => {
+                let info = topics.get(topic)?;
+                let mut words = vec![0; info.words];
+                let Stamp { at, generation } = layout.decode(payload, &mut words)?;
+                Some(match info.is_outside {
+                    true => Entry::Outside { topic, at, generation, words },
+                    false => Entry::Inside { topic, at, generation, words },
+                })
+            }
+            Self::Activation { index, inputs } => {
+                let record = ActivationTopic::decode(payload, inputs).filter(|record| record.index == index)?;
+                Some(if record.refused == 0 { Entry::Activation(record) } else { Entry::Refusals(record) })
+            }
+        }
     }
 }

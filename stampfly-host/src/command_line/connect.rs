@@ -29,7 +29,7 @@ pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
             None => return Ok(ExitCode::from(USAGE)),
         },
         _ => {
-            eprintln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
+            errln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
             return Ok(ExitCode::from(USAGE));
         }
     };

@@ -2,11 +2,12 @@
 
 use crate::command_line::arguments::DoctorOptions;
 use crate::command_line::failure::Failure;
+use crate::command_line::terminal::Screen;
 use crate::doctor::console::Serial;
 use crate::doctor::newcomer::Newcomer;
 use crate::doctor::{Chart, emulated, examine};
 use stampfly_board::simulation::bench::fault;
-use std::io::{BufRead, stdin, stdout};
+use std::io::{BufRead, stdin};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -25,7 +26,7 @@ pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
             let all = fault::all();
             let fault = all.iter().find(|fault| fault.name == *name);
             if fault.is_none() && !name.is_empty() {
-                eprintln!("stampfly: there is no fault '{name}'; --list-faults lists them");
+                errln!("stampfly: there is no fault '{name}'; --list-faults lists them");
                 return Ok(ExitCode::from(USAGE));
             }
             emulated::examine(fault.map(|fault| &fault.defect), options.seed)
@@ -47,7 +48,7 @@ pub fn port_of(typed: Option<&str>) -> Option<String> {
         (None, [only]) => Some(only.clone()),
         (None, found) => {
             let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
-            eprintln!("stampfly: which port is the vehicle's? --port PORT; {found}");
+            errln!("stampfly: which port is the vehicle's? --port PORT; {found}");
             None
         }
     }
@@ -60,7 +61,7 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
         let mut typed = String::new();
         stdin().lock().read_line(&mut typed)?;
         if typed.trim() != "off" {
-            eprintln!("stampfly: with propellers on it is not examined");
+            errln!("stampfly: with propellers on it is not examined");
             return Ok(None);
         }
     }
@@ -70,7 +71,7 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
         path,
         port: None,
         keys: stdin().lock(),
-        screen: stdout().lock(),
+        screen: Screen,
         begun: Instant::now(),
         transcript: String::new(),
     };

@@ -34,16 +34,16 @@ pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
             Ok(figures) => rows.push(Row { file: file.display().to_string(), figures }),
             Err(failure) => {
                 failed = true;
-                bar.suspend(|| eprintln!("stampfly: {failure}"));
+                bar.suspend(|| errln!("stampfly: {failure}"));
             }
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
     if options.json {
-        println!("{}", serde_json::json!({ "files": rows }));
-    } else {
-        print_table(&rows);
+        outln!("{}", serde_json::json!({ "files": rows }));
+    } else if !rows.is_empty() {
+        outln!("{}", table(&rows));
     }
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -84,37 +84,41 @@ const COLUMNS: [(&str, &str, usize, Value); 11] = [
     ("gnss vel", "m/s", 3, |f| f.receiver.as_ref()?.velocity_mps),
 ];
 
-fn print_table(rows: &[Row]) {
-    if rows.is_empty() {
-        return;
-    }
+/// A line a file.
+fn table(rows: &[Row]) -> String {
     let name = |row: &Row| Path::new(&row.file).file_name().unwrap_or_default().to_string_lossy().into_owned();
     let width = rows.iter().map(|row| name(row).len()).max().unwrap_or(0).max(4);
-    print!("{:<width$} {:<15} {:>7}", "file", "kind", "s");
-    COLUMNS.iter().for_each(|(column, ..)| print!(" {column:>9}"));
-    println!(" {:>9}  rejected", "updates/s");
+    let mut text = format!("{:<width$} {:<15} {:>7}", "file", "kind", "s");
+    COLUMNS.iter().for_each(|(column, ..)| text += &format!(" {column:>9}"));
+    text += &format!(" {:>9}  rejected\n", "updates/s");
     for row in rows {
         let figures = &row.figures;
-        print!("{:<width$} {:<15} {:>7.1}", name(row), figures.kind, figures.duration_s);
+        text += &format!("{:<width$} {:<15} {:>7.1}", name(row), figures.kind, figures.duration_s);
         for (_, _, decimals, value) in COLUMNS {
             match value(figures) {
-                Some(value) => print!(" {value:>9.decimals$}"),
-                None => print!(" {:>9}", "–"),
+                Some(value) => text += &format!(" {value:>9.decimals$}"),
+                None => text += &format!(" {:>9}", "–"),
             }
         }
-        print!(" {:>8.2}M ", figures.updates_per_s / 1e6);
+        text += &format!(" {:>8.2}M ", figures.updates_per_s / 1e6);
         for (sensor, share) in &figures.rejected {
-            print!(" {sensor} {:.1} %", share * 100.0);
+            text += &format!(" {sensor} {:.1} %", share * 100.0);
         }
         if figures.truth_gaps > 0 {
-            print!("  {} gaps in the reference", figures.truth_gaps);
+            text += &format!("  {} gaps in the reference", figures.truth_gaps);
         }
-        println!("{}", if figures.diverged { "  DIVERGED" } else { "" });
+        text += if figures.diverged { "  DIVERGED\n" } else { "\n" };
     }
-    println!(
-        "\nend, max: horizontal distance from the start; flow: the same by flow alone; RMS errors against the reference; \
-         gnss: RMS difference to a satellite receiver"
-    );
+    text += "\nend, max: horizontal distance from the start; flow: the same by flow alone; RMS errors against the reference; \
+             gnss: RMS difference to a satellite receiver";
+    for row in rows.iter().filter(|row| row.figures.clock_back > 0) {
+        text += &format!(
+            "\n{}: the clock goes back: {} inertial samples were left out, and the figures are of the others",
+            name(row),
+            row.figures.clock_back
+        );
+    }
+    text
 }
 
 /// The summary of the page.
@@ -129,6 +133,10 @@ fn metrics(recording: &Recording, estimated: &Estimated) -> Vec<Metric> {
         if let Some(value) = value(figures) {
             metrics.push(Metric::new(name, format!("{value:.decimals$}"), unit));
         }
+    }
+    if figures.clock_back > 0 {
+        let metric = Metric::new("Left out, clock goes back", figures.clock_back.to_string(), "samples");
+        metrics.push(metric.judged(false));
     }
     for (sensor, share) in &figures.rejected {
         metrics.push(Metric::new(format!("Rejected, {sensor}"), format!("{:.1}", share * 100.0), "%"));

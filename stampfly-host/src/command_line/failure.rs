@@ -8,6 +8,6 @@ pub type Failure = Box<dyn std::error::Error>;
 
 /// Tells it on standard error.
 pub fn tell(failure: &Failure) -> ExitCode {
-    eprintln!("stampfly: {failure}");
+    errln!("stampfly: {failure}");
     ExitCode::FAILURE
 }

@@ -91,7 +91,7 @@ impl<'o> Campaign<'o> {
             Ok(contents) => Err(other_campaign(&path, &contents.identity, &self.identity::<V>(shard)).into()),
             Err(error) if error.is_missing() => Ok(None),
             Err(error) => {
-                eprintln!("stampfly: {error}; its flights are flown again");
+                errln!("stampfly: {error}; its flights are flown again");
                 Ok(None)
             }
         }

@@ -20,7 +20,7 @@ const USAGE: u8 = 2;
 
 pub fn run(options: &HilOptions) -> Result<ExitCode, Failure> {
     if options.fly.from.is_some() {
-        eprintln!("stampfly: a flight of a campaign is flown again here: stampfly fly --from");
+        errln!("stampfly: a flight of a campaign is flown again here: stampfly fly --from");
         return Ok(ExitCode::from(USAGE));
     }
     if options.fly.scene.list {

@@ -2,13 +2,16 @@
 
 use crate::command_line::arguments::LogCommand;
 use crate::command_line::failure::Failure;
-use crate::log::{csv, cut, info::Info, mcap, record, refly};
+use crate::log::csv::{self, FileNames};
+use crate::log::info::{Info, omissions};
+use crate::log::{cut, mcap, record, refly};
 use crate::serve::receive;
 use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_flight::compact::{Contents, Samples};
 use stampfly_flight::replay;
-use stampfly_lab::flight_log::{self, FlightLog};
+use stampfly_lab::flight::Series;
+use stampfly_lab::flight_log::{self, FlightLog, Omission};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
 use std::fs::File;
@@ -31,29 +34,37 @@ pub fn run(command: &LogCommand) -> Result<ExitCode, Failure> {
         LogCommand::Csv { file, topic, out } => {
             let log = load(file)?;
             std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            let mut names = FileNames::new(&file.file_stem().unwrap_or_default().to_string_lossy());
+            let mut failure = missing(&log, topic).map(|error| say(file, &error));
             for (name, series) in log.flight.topics.iter().filter(|(name, _)| wanted(topic, name)) {
-                // As pyulog names them: topic, then the instance.
-                let (name, instance) = name.trim_end_matches(']').split_once('[').unwrap_or((name, "0"));
-                let path = out.join(format!("{stem}_{name}_{instance}.csv"));
-                let mut table = create(&path)?;
-                csv::write(series, &mut table).and_then(|()| table.flush()).map_err(|error| say(&path, &error))?;
-                outln!("{}   {} rows", path.display(), series.at.len());
+                let path = out.join(names.next(name));
+                match table(series, &path) {
+                    Ok(()) => outln!("{}   {} rows", path.display(), series.at.len()),
+                    // The others are worth having all the same.
+                    Err(error) => failure = Some(say(&path, &error)),
+                }
             }
+            tell_end(&log);
+            failure.map_or(Ok(()), Err)?;
         }
         LogCommand::Mcap { file, topic, out } => {
             let log = load(file)?;
+            missing(&log, topic).map_or(Ok(()), |error| Err(say(file, &error)))?;
             let path = out.clone().unwrap_or_else(|| file.with_extension("mcap"));
             mcap::write(&log.flight, |name| wanted(topic, name), create(&path)?).map_err(|error| say(&path, &error))?;
             outln!("{}", path.display());
+            tell_end(&log);
         }
         LogCommand::Cut { file, from, to, out } => {
             let bytes = std::fs::read(file).map_err(|error| say(file, &error))?;
             let instant = |seconds: f64| Instant::from_micros((seconds.max(0.0) * 1e6) as u64);
             let (log, _) = record::as_log(&bytes).map_err(|error| say(file, &error))?;
-            let part = cut::cut(&log, instant(*from), instant(*to)).map_err(|error| say(file, &error))?;
+            let (part, end) = cut::cut(&log, instant(*from), instant(*to)).map_err(|error| say(file, &error))?;
             std::fs::write(out, &part).map_err(|error| say(out, &error))?;
             outln!("{}   {} of {} bytes", out.display(), part.len(), bytes.len());
+            if !end.is_whole() {
+                outln!("the log is {end}");
+            }
         }
         LogCommand::Receive { address, out, seconds } => {
             let socket = UdpSocket::bind(address).map_err(|error| format!("{address}: {error}"))?;
@@ -89,7 +100,7 @@ fn load(path: &Path) -> Result<FlightLog, Failure> {
     let bytes = std::fs::read(path).map_err(|error| say(path, &error))?;
     let (log, contents) = record::as_log(&bytes).map_err(|error| say(path, &error))?;
     if let Some(contents) = contents {
-        eprintln!("a compact record, run again: {}", told(&contents));
+        errln!("a compact record, run again: {}", told(&contents));
     }
     Ok(flight_log::parse(&log).map_err(|error| say(path, &error))?)
 }
@@ -130,9 +141,33 @@ impl ForVehicle for Refly<'_> {
     }
 }
 
-/// Without names, all topics are.
+/// Without names, all topics are. A name without an instance is of all of them.
 fn wanted(topics: &[String], name: &str) -> bool {
-    topics.is_empty() || topics.iter().any(|topic| topic == name)
+    let without = name.split_once(['[', '#']).map_or(name, |(without, _)| without);
+    topics.is_empty() || topics.iter().any(|topic| topic == name || topic == without)
+}
+
+/// The first of these topics that the log does not have, and why, if that is known.
+fn missing(log: &FlightLog, topics: &[String]) -> Option<String> {
+    let has = |wants: &String| log.flight.topics.keys().any(|name| wanted(std::slice::from_ref(wants), name));
+    let name = topics.iter().find(|topic| !has(topic))?;
+    let reason =
+        log.omissions.iter().find(|omission| matches!(omission, Omission::Topic { topic, .. } if topic == name));
+    Some(reason.map_or_else(|| format!("no topic `{name}`; `stampfly log info` lists them"), ToString::to_string))
+}
+
+/// How far the log is whole, and what is left out of it.
+fn tell_end(log: &FlightLog) {
+    if !log.end.is_whole() {
+        outln!("the log is {}", log.end);
+    }
+    omissions(log).for_each(|omission| outln!("not read: {omission}"));
+}
+
+fn table(series: &Series, path: &Path) -> std::io::Result<()> {
+    let mut table = BufWriter::new(File::create(path)?);
+    csv::write(series, &mut table)?;
+    table.flush()
 }
 
 fn create(path: &Path) -> Result<BufWriter<File>, Failure> {

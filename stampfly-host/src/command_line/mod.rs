@@ -8,6 +8,11 @@ macro_rules! outln {
     ($($text:tt)*) => { crate::command_line::terminal::print(&format!("{}\n", format_args!($($text)*))) };
 }
 
+/// `eprintln!` of text in which there may be something foreign.
+macro_rules! errln {
+    ($($text:tt)*) => { crate::command_line::terminal::print_error(&format!("{}\n", format_args!($($text)*))) };
+}
+
 mod arguments;
 mod campaign;
 mod connect;

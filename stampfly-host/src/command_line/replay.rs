@@ -1,4 +1,5 @@
-//! `stampfly replay`: the flight again. Exit code 0 when it is the same, 1 when it differs or cannot be replayed.
+//! `stampfly replay`: the flight again. Exit code 0 when it is the same as far as the log is whole,
+//! which is said, 1 when it differs or cannot be replayed.
 
 use crate::command_line::arguments::ReplayOptions;
 use crate::command_line::failure::Failure;
@@ -46,7 +47,8 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
             json!({
                 "vehicle": named, "identical": result.difference.is_none(), "activations": result.activations,
                 "samples": result.samples, "key_frames": result.key_frames, "gaps": result.gaps,
-                "skipped": result.skipped, "difference": difference,
+                "skipped": result.skipped, "whole": result.end.is_whole(), "end": result.end.to_string(),
+                "difference": difference,
             })
         );
     } else {
@@ -64,6 +66,9 @@ pub fn run(options: &ReplayOptions) -> Result<ExitCode, Failure> {
         }
         if result.skipped > 0 {
             outln!("{} activations were not repeated: before the start, or in {} gaps", result.skipped, result.gaps);
+        }
+        if !result.end.is_whole() {
+            outln!("the log is {}", result.end);
         }
     }
     Ok(if result.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -2,7 +2,52 @@
 
 use super::shown;
 use stampfly_lab::flight::Series;
+use std::collections::BTreeMap;
 use std::io::{self, Write};
+
+/// Letters of a log's name, and of a topic's, in the name of a table.
+const MAX_LETTERS: usize = 80;
+
+/// Names of the files of a log's tables, as pyulog gives them: log, topic, instance. A topic's name
+/// comes from the log, which may say anything: of it only letters, digits, `_` and `-` are kept,
+/// and no two files have one name, on no file system.
+///
+/// ```
+/// use stampfly_host::log::csv::FileNames;
+/// let mut names = FileNames::new("flight");
+/// assert_eq!(names.next("esc_status"), "flight_esc_status_0.csv");
+/// assert_eq!(names.next("esc_status[2]"), "flight_esc_status_2.csv");
+/// assert_eq!(names.next("../../etc/x"), "flight_______etc_x_0.csv");
+/// assert_eq!(names.next("ESC_status"), "flight_ESC_status_0-2.csv");
+/// ```
+#[derive(Clone, Debug)]
+pub struct FileNames {
+    log: String,
+    /// How many files have a name, in small letters.
+    used: BTreeMap<String, usize>,
+}
+
+impl FileNames {
+    /// For the tables of the log with this name.
+    #[must_use]
+    pub fn new(log: &str) -> Self {
+        Self { log: log.chars().take(MAX_LETTERS).collect(), used: BTreeMap::new() }
+    }
+
+    /// The name of this topic's file.
+    pub fn next(&mut self, topic: &str) -> String {
+        let numbered = topic.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
+        let numbered = numbered.and_then(|(name, instance)| Some((name, instance.parse::<u8>().ok()?)));
+        let (name, instance) = numbered.unwrap_or((topic, 0));
+        let keeps = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
+        let safe: String = name.chars().map(|c| if keeps(c) { c } else { '_' }).take(MAX_LETTERS).collect();
+        let name = format!("{}_{safe}_{instance}", self.log);
+        let count = self.used.entry(name.to_lowercase()).or_default();
+        *count += 1;
+        // What is added cannot be the end of another's name: that is its instance.
+        if *count == 1 { format!("{name}.csv") } else { format!("{name}-{count}.csv") }
+    }
+}
 
 /// Writes a topic as a table.
 ///

@@ -2,21 +2,23 @@
 //!
 //! Everything that describes the log is kept: facts, parameters, formats, topics. Of the samples and activations only those between
 //! the two instants are. A mark says that something is missing before them, and so `stampfly replay` goes on at the first key frame of
-//! the part, as it does after any gap.
+//! the part, as it does after any gap. Where the log is damaged, the part has such a mark as well.
 
 use stampfly_flight::recorder::KEY_FRAME;
-use stampfly_log::ulog::{Message, ReadError, Reader, Scalar};
+use stampfly_log::ulog::{End, FlagBits, Message, ReadError, Reader, Scalar};
 use stampfly_types::Instant;
 use std::collections::BTreeMap;
 
 /// A dropout of an unknown length: type, and a duration of zero.
 const GAP: [u8; 5] = [2, 0, b'O', 0, 0];
+/// Where the flags begin in a log, behind the header of the file and that of their message.
+const FLAGS: usize = 19;
 
-/// Cuts out what lies between these instants, both included.
+/// Cuts out what lies between these instants, both included. Says how far the log was whole, too.
 ///
 /// # Errors
-/// When it is no log, or one that is damaged: cutting would hide it.
-pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<Vec<u8>, ReadError> {
+/// When it is no log.
+pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<(Vec<u8>, End), ReadError> {
     let mut reader = Reader::new(log)?;
     let mut kept = log.get(..reader.offset()).unwrap_or_default().to_vec();
     // Where the time stamp of each format is, and of each subscription.
@@ -24,10 +26,18 @@ pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<Vec<u8>, ReadError>
     let (mut newest, mut is_marked) = (reader.started(), false);
     loop {
         let begin = reader.offset();
-        let Some(message) = reader.next() else { return Ok(kept) };
-        let keeps = match message? {
+        let Some(message) = reader.next() else { return Ok((kept, reader.end())) };
+        let Ok(message) = message else {
+            // What was there could be missed, unless nothing follows.
+            if reader.offset() < log.len() && (from..=to).contains(&newest) {
+                kept.extend(GAP);
+            }
+            continue;
+        };
+        let keeps = match message {
             Message::Format(format) => {
-                let stamp = format.columns().flatten().find(|c| c.field == "timestamp" && c.scalar == Scalar::U64);
+                let mut columns = format.columns().map_while(Result::ok);
+                let stamp = columns.find(|column| column.field == "timestamp" && column.scalar == Scalar::U64);
                 stamps.insert(format.name.to_owned(), stamp.map(|column| column.offset));
                 true
             }
@@ -37,7 +47,10 @@ pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<Vec<u8>, ReadError>
             }
             Message::Data { id, payload } => {
                 let stamp = ids.get(&id).copied().flatten().and_then(|at| payload.get(at..)?.first_chunk().copied());
-                newest = stamp.map_or(newest, |stamp| Instant::from_micros(u64::from_le_bytes(stamp)));
+                let stamp = stamp.map(|stamp| Instant::from_micros(u64::from_le_bytes(stamp)));
+                // Zero is no time, unless the log begins there.
+                let is_time = |at: &Instant| *at != Instant::ZERO || reader.started() == Instant::ZERO;
+                newest = stamp.filter(is_time).unwrap_or(newest);
                 (from..=to).contains(&newest)
             }
             Message::Text { at, .. } => (from..=to).contains(&at),
@@ -55,6 +68,20 @@ pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<Vec<u8>, ReadError>
                 is_marked = true;
             }
             kept.extend(log.get(begin..reader.offset()).unwrap_or_default());
+        }
+        if let Message::FlagBits(_) = message {
+            forget_appended(&mut kept);
+        }
+    }
+}
+
+/// Appended parts follow the rest in the part without a seam, and nothing is where it was.
+fn forget_appended(kept: &mut [u8]) {
+    if let Some(flags) = kept.get_mut(FLAGS..FLAGS + 40) {
+        let (features, places) = flags.split_at_mut(16);
+        if let Some(incompatible) = features.get_mut(8).filter(|bits| **bits & FlagBits::DATA_APPENDED != 0) {
+            *incompatible &= !FlagBits::DATA_APPENDED;
+            places.fill(0);
         }
     }
 }

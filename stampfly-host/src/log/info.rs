@@ -1,7 +1,8 @@
 //! What is in a log.
 
 use serde::Serialize;
-use stampfly_lab::flight_log::FlightLog;
+use stampfly_lab::flight_log::{FlightLog, Omission};
+use stampfly_log::plain;
 use stampfly_types::Instant;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -13,7 +14,8 @@ pub struct Info {
     pub facts: BTreeMap<String, String>,
     /// Number of parameters.
     pub parameters: usize,
-    /// Instant of the first sample, s since power-on.
+    /// Instant of the first sample, s since power-on. Samples that have no time, with a stamp of
+    /// zero, do not count.
     pub first_s: f64,
     /// Instant of the last sample, s since power-on.
     pub last_s: f64,
@@ -21,6 +23,10 @@ pub struct Info {
     pub topics: BTreeMap<String, TopicInfo>,
     /// Gaps that the writer has marked.
     pub gaps: usize,
+    /// Was every byte of it read?
+    pub whole: bool,
+    /// How far it is whole, as a sentence.
+    pub end: String,
     /// What of it cannot be read.
     pub omissions: Vec<String>,
 }
@@ -62,14 +68,14 @@ impl Info {
     pub fn of(log: &FlightLog) -> Self {
         let flight = &log.flight;
         let seconds = |at: Instant| at.as_micros() as f64 * 1e-6;
-        let stamps = || flight.topics.values().flat_map(|series| series.at.iter().copied());
+        let span = flight.span();
         let topics = flight.topics.iter().map(|(name, series)| {
-            let ends = series.at.iter().min().zip(series.at.iter().max());
-            let length = ends.map_or(0.0, |(first, last)| seconds(*last) - seconds(*first));
-            let gaps = series.at.windows(2).map(|pair| seconds(pair[1]) - seconds(pair[0]));
+            let times: Vec<f64> = series.at.iter().filter(|at| flight.is_time(**at)).map(|at| seconds(*at)).collect();
+            let (first, last) = times.iter().fold((f64::MAX, f64::MIN), |(min, max), at| (min.min(*at), max.max(*at)));
+            let gaps = times.windows(2).map(|pair| pair[1] - pair[0]);
             let info = TopicInfo {
                 samples: series.at.len(),
-                rate_hz: (length > 0.0).then(|| (series.at.len() - 1) as f64 / length),
+                rate_hz: (last > first).then(|| (times.len() - 1) as f64 / (last - first)),
                 longest_gap_s: gaps.fold(0.0, f64::max),
                 fields: series.columns.len(),
             };
@@ -78,19 +84,26 @@ impl Info {
         Self {
             facts: flight.info.iter().map(|(name, value)| (name.clone(), value.clone())).collect(),
             parameters: flight.parameters.len(),
-            first_s: stamps().min().map_or(0.0, seconds),
-            last_s: stamps().max().map_or(0.0, seconds),
+            first_s: span.map_or(0.0, |(first, _)| seconds(first)),
+            last_s: span.map_or(0.0, |(_, last)| seconds(last)),
             topics: topics.collect(),
             gaps: log.dropouts.len(),
-            omissions: log.omissions.iter().map(ToString::to_string).collect(),
+            whole: log.end.is_whole(),
+            end: log.end.to_string(),
+            omissions: omissions(log).map(ToString::to_string).collect(),
         }
     }
+}
+
+/// What is left out of a log and is not damage, of which its end tells.
+pub(crate) fn omissions(log: &FlightLog) -> impl Iterator<Item = &Omission> {
+    log.omissions.iter().filter(|omission| !matches!(omission, Omission::Damage(_)))
 }
 
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (name, value) in &self.facts {
-            writeln!(f, "{name:<24}{value}")?;
+            writeln!(f, "{:<24}{}", plain(name).to_string(), plain(value))?;
         }
         writeln!(f, "{:<24}{}", "parameters", self.parameters)?;
         writeln!(f, "{:<24}{:.3} s to {:.3} s", "samples", self.first_s, self.last_s)?;
@@ -98,10 +111,14 @@ impl fmt::Display for Info {
         for (name, topic) in &self.topics {
             let rate = topic.rate_hz.map_or_else(|| "–".to_owned(), |rate| format!("{rate:.1}"));
             let TopicInfo { samples, longest_gap_s, fields, .. } = topic;
+            let name = plain(name).to_string();
             writeln!(f, "{name:<24}{samples:>9} {rate:>10} {longest_gap_s:>14.3} {fields:>7}")?;
         }
         if self.gaps > 0 {
             writeln!(f, "\n{} gaps: the writer could not keep up, or a part was cut out", self.gaps)?;
+        }
+        if !self.whole {
+            writeln!(f, "\nthe log is {}", self.end)?;
         }
         self.omissions.iter().try_for_each(|omission| writeln!(f, "\nnot read: {omission}"))
     }

@@ -1,7 +1,7 @@
 //! MCAP, for Foxglove and PlotJuggler: a channel a topic, samples as JSON with a schema that has the units.
 //!
-//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it without being told how; whoever wants it
-//! short keeps the ULog, which both programs open as well.
+//! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it
+//! without being told how; the ULog is shorter, and both programs open it as well.
 
 use serde_json::{Map, Value, json};
 use stampfly_lab::flight::{Flight, Series};
@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::sync::Arc;
 
-/// Writes the topics of a flight that `wants` says, in the order of their instants.
+/// Writes the topics of a flight that `wants` says, in the order of their instants. What has no
+/// time, with a stamp of zero, comes when the recording was started.
 ///
 /// # Errors
 /// When `out` does not take it.
@@ -37,14 +38,13 @@ pub fn write<W: Write + Seek>(flight: &Flight, wants: impl Fn(&str) -> bool, out
     let mut order: Vec<_> = topics
         .iter()
         .enumerate()
-        .flat_map(|(topic, (_, series))| series.at.iter().enumerate().map(move |(row, at)| (*at, topic, row)))
+        .flat_map(|(topic, (_, series))| series.at.iter().enumerate().map(move |(row, at)| (at, topic, row)))
+        .map(|(at, topic, row)| (if flight.is_time(*at) { *at } else { flight.started }, topic, row))
         .collect();
     order.sort_unstable();
-    let mut counts = vec![0_u32; topics.len()];
+    let mut written: Vec<_> = topics.iter().map(|(_, series)| (*series, fields(series), 0_u32)).collect();
     for (at, topic, row) in order {
-        let (Some((_, series)), Some(channel), Some(count)) =
-            (topics.get(topic), channels.get(topic), counts.get_mut(topic))
-        else {
+        let (Some((series, fields, count)), Some(channel)) = (written.get_mut(topic), channels.get(topic)) else {
             continue;
         };
         let time = at.as_micros().saturating_mul(1_000);
@@ -53,7 +53,7 @@ pub fn write<W: Write + Seek>(flight: &Flight, wants: impl Fn(&str) -> bool, out
             sequence: *count,
             log_time: time,
             publish_time: time,
-            data: Cow::Owned(sample(series, row).to_string().into_bytes()),
+            data: Cow::Owned(sample(series, fields, row).to_string().into_bytes()),
         })?;
         *count += 1;
     }
@@ -61,9 +61,12 @@ pub fn write<W: Write + Seek>(flight: &Flight, wants: impl Fn(&str) -> bool, out
     Ok(())
 }
 
-/// Fields of a series: name, and the places of its columns. One with an index is a list.
-fn fields(series: &Series) -> Vec<(&str, Vec<usize>)> {
-    let mut fields: Vec<(&str, Vec<usize>)> = Vec::new();
+/// A field: name, and the places of its columns.
+type Field<'s> = (&'s str, Vec<usize>);
+
+/// Fields of a series. One with an index is a list.
+fn fields(series: &Series) -> Vec<Field<'_>> {
+    let mut fields: Vec<Field<'_>> = Vec::new();
     for (place, column) in series.columns.iter().enumerate() {
         match fields.last_mut().filter(|(name, _)| *name == column.field) {
             Some((_, places)) => places.push(place),
@@ -93,19 +96,19 @@ fn schema(series: &Series) -> Value {
     json!({ "type": "object", "properties": properties })
 }
 
-fn sample(series: &Series, row: usize) -> Value {
+fn sample(series: &Series, fields: &[Field<'_>], row: usize) -> Value {
     // What is no number is `null` in JSON.
     let number = |place: &usize| -> Value {
         let value = series.columns.get(*place).and_then(|column| column.values.get(row)).copied();
         value.and_then(|value| super::shown(value).parse().ok()).map_or(Value::Null, Value::Number)
     };
     let mut object = Map::new();
-    for (name, places) in fields(series) {
-        let value = match (is_list(series, &places), places.as_slice()) {
+    for (name, places) in fields {
+        let value = match (is_list(series, places), places.as_slice()) {
             (false, [place]) => number(place),
             _ => places.iter().map(number).collect::<Vec<_>>().into(),
         };
-        object.insert(name.to_owned(), value);
+        object.insert((*name).to_owned(), value);
     }
     object.into()
 }

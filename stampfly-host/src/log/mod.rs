@@ -9,7 +9,8 @@
 //! | [`record`] | `stampfly log ulog` | a [compact record](stampfly_flight::compact) as a log |
 //! | [`refly`] | `stampfly log refly` | a simulated flight again, with other parameters from an instant on |
 //!
-//! They read any ULog, and compact records of the vehicles here; `refly` reads logs of the simulator. `stampfly replay`
+//! They read what is whole of a log, and say how far that is with the sentence of
+//! [`End`](stampfly_log::ulog::End). They read any ULog, and compact records of the vehicles here; `refly` reads logs of the simulator. `stampfly replay`
 //! repeats what the flight stack computed in one of ours.
 
 pub mod csv;

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use stampfly_bus::Schedule;
 use stampfly_lab::flight::{Column, Flight, Series};
 use stampfly_lab::flight_log::{self, FlightLog};
-use stampfly_log::ulog::ReadError;
+use stampfly_log::ulog::{End, ReadError};
 use stampfly_sim::recorder::Recorder;
 use stampfly_sim::vehicle::change::{Change, ChangeError};
 use stampfly_sim::vehicle::{Motion, Observer, Options, Page, PanelSpec, SetupError, Vehicle, Verdict};
@@ -111,6 +111,8 @@ pub struct Reflown<O> {
     pub outcomes: [O; 2],
     /// How far apart the courses are.
     pub apart: Apart,
+    /// How far the log of the flight was whole.
+    pub end: End,
     flight: Flight,
 }
 
@@ -135,7 +137,12 @@ pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Re
         .collect();
     let mut before = Recorder::<V>::with_log(&setup, &facts);
     let flown_before = fly::<V>(&setup, &mut before, &mut |_, _| {});
-    if before.log() != log {
+    // As far as the log goes: it may have been cut off.
+    let whole = match recorded.end {
+        End::Cut { at, .. } => at,
+        _ => log.len(),
+    };
+    if !log.get(..whole).is_some_and(|whole| before.log().starts_with(whole)) {
         return Err(ReflyError::OtherFlight { version: fact("ver_sw").cloned().unwrap_or_default() });
     }
 
@@ -159,7 +166,7 @@ pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Re
     let FlightLog { mut flight, .. } = flight_log::parse(&log).map_err(ReflyError::Log)?;
     let apart = compare(&mut flight, &recorded.flight, V::PAGE.observers, changed_at);
     let outcomes = [flown_before, flown].map(|Flown { outcome, .. }| outcome);
-    Ok(Reflown { changed_at, parameters: parameters.to_vec(), log, outcomes, apart, flight })
+    Ok(Reflown { changed_at, parameters: parameters.to_vec(), log, outcomes, apart, end: recorded.end, flight })
 }
 
 fn config<V: Vehicle>(setup: &V::Setup) -> <V::Runnables as Schedule>::Config {
@@ -267,6 +274,7 @@ impl<O: Verdict> Reflown<O> {
             "changed": self.parameters, "changed_at_s": self.changed_at.as_micros() as f64 * 1e-6,
             "apart_since_s": self.apart.since_s, "farthest_m": self.apart.farthest_m,
             "farthest_at_s": self.apart.farthest_at_s, "at_end_m": self.apart.at_end_m,
+            "whole": self.end.is_whole(), "end": self.end.to_string(),
             "before": before, "now": now,
         })
     }
@@ -305,6 +313,9 @@ impl<O: Verdict> fmt::Display for Reflown<O> {
         }
         for (what, outcome) in ["as it flew", "now"].into_iter().zip(&self.outcomes) {
             writeln!(f, "{what:<12}{}", outcome.sentence())?;
+        }
+        if !self.end.is_whole() {
+            writeln!(f, "the log is {}", self.end)?;
         }
         Ok(())
     }

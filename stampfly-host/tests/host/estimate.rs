@@ -110,3 +110,19 @@ fn a_wrong_option_is_named() {
     let output = stampfly(&[]);
     assert_eq!(output.status.code(), Some(2), "a file is needed");
 }
+
+#[test]
+fn a_clock_that_goes_back_is_told() {
+    let file = folder("back").join("back.csv");
+    let text_of = still();
+    let (header, rows) = text_of.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().collect();
+    std::fs::write(&file, [&[header], &rows[..150], &rows[100..]].concat().join("\n")).unwrap();
+    let output = stampfly(&[&file]);
+    assert!(output.status.success(), "{output:?}");
+    let said = text(&output.stdout);
+    assert!(said.contains("back.csv: the clock goes back: ") && said.contains("samples were left out"), "{said}");
+    let output = stampfly(&[&file, Path::new("--json")]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["files"][0]["clock_back"].as_u64() > Some(20), "{json}");
+}

@@ -1,10 +1,12 @@
 //! Logs of flights in the tools' hands: a part replays, tables and MCAP hold what the log holds.
 
 use crate::flown::{HOP, Hop, hop};
+use crate::foreign_log::{message, px4_like};
 use crate::replay::replay;
 use serde_json::Value;
 use stampfly_host::log::{csv, cut, info::Info, mcap};
 use stampfly_lab::flight_log;
+use stampfly_log::ulog::End;
 use stampfly_types::Instant;
 use std::io::Cursor;
 
@@ -14,7 +16,8 @@ fn a_part_of_a_flight_replays_bit_for_bit() {
     let length = Info::of(&flight_log::parse(whole).expect("a log")).last_s;
     for (from, to) in [(0.0, 4.0), (4.0, 9.5), (length - 3.0, length + 10.0)] {
         let instant = |seconds: f64| Instant::from_micros((seconds * 1e6) as u64);
-        let part = cut::cut(whole, instant(from), instant(to)).expect("a log");
+        let (part, end) = cut::cut(whole, instant(from), instant(to)).expect("a log");
+        assert_eq!(end, End::Whole);
         assert!(part.len() < whole.len() * 2 / 3, "{from} to {to}");
         let again = replay(&part).expect("a log of ours");
         assert_eq!(again.difference, None, "{from} to {to}");
@@ -25,19 +28,63 @@ fn a_part_of_a_flight_replays_bit_for_bit() {
         assert_eq!(info.gaps, usize::from(from > 0.0));
     }
     assert_eq!(
-        cut::cut(whole, Instant::ZERO, Instant::from_secs(1_000)).as_ref(),
-        Ok(whole),
+        cut::cut(whole, Instant::ZERO, Instant::from_secs(1_000)),
+        Ok((whole.clone(), End::Whole)),
         "everything is the log itself"
     );
 }
 
 #[test]
-fn a_damaged_log_is_not_cut() {
-    let mut damaged = HOP.log.clone();
-    let middle = damaged.len() / 2;
-    damaged.drain(middle..middle + 3);
-    assert!(cut::cut(&damaged, Instant::ZERO, Instant::from_secs(1_000)).is_err());
+fn of_a_damaged_log_the_whole_is_cut_and_replays() {
+    let log = &HOP.log;
+    let middle = log.len() / 2;
+    let damaged = [&log[..middle], &log[middle + 3..]].concat();
+    let (part, end) = cut::cut(&damaged, Instant::ZERO, Instant::from_secs(1_000)).expect("a log");
+    assert!(matches!(end, End::Damaged { .. }), "{end}");
+    let info = Info::of(&flight_log::parse(&part).expect("a log"));
+    assert!(info.whole && info.gaps >= 1, "the part is whole, and marked where something is missing: {info}");
+    let again = replay(&part).expect("a log of ours");
+    assert!(again.difference.is_none() && again.gaps >= 1, "{again:?}");
+
+    let (part, end) = cut::cut(&log[..middle], Instant::ZERO, Instant::from_secs(5)).expect("a log");
+    let whole = cut::cut(log, Instant::ZERO, Instant::from_secs(5)).expect("a log");
+    assert_eq!(part, whole.0, "what is cut off lies behind");
+    assert!(matches!(end, End::Cut { .. } | End::Whole), "{end}");
     assert!(cut::cut(b"no log", Instant::ZERO, Instant::from_secs(1)).is_err());
+}
+
+/// Places of appended parts are of the log, not of a part of it.
+#[test]
+fn a_part_of_a_log_with_appended_data_is_a_log() {
+    let mut log = px4_like();
+    let behind = log.len();
+    message(&mut log, b'P', &[&[9], b"float x_y", &1.0_f32.to_le_bytes()]);
+    // Header of the file and of the message, compatible features; incompatible ones, then places.
+    log[16 + 3 + 8] = 1;
+    log[16 + 3 + 16..][..8].copy_from_slice(&(behind as u64).to_le_bytes());
+    let (part, _) = cut::cut(&log, Instant::from_micros(1_000_100_000), Instant::from_secs(2_000)).expect("a log");
+    let log = flight_log::parse(&part).expect("a log");
+    assert_eq!((log.end, log.flight.parameters.len()), (End::Whole, 2));
+    assert_eq!(log.flight.topics["esc_status"].at.len(), 10);
+}
+
+#[test]
+fn what_has_no_time_does_not_say_when_a_log_begins() {
+    let log = flight_log::parse(&px4_like()).expect("a log");
+    let info = Info::of(&log);
+    assert!((info.first_s - 1_000.0).abs() < 1e-9 && (info.last_s - 1_000.195).abs() < 1e-9, "{info}");
+    let triplet = &info.topics["position_setpoint_triplet"];
+    assert!((triplet.rate_hz.expect("two samples") - 100.0).abs() < 1e-6 && triplet.longest_gap_s < 0.011, "{info}");
+
+    let mut file = Cursor::new(Vec::new());
+    mcap::write(&log.flight, |_| true, &mut file).expect("memory");
+    let bytes = file.into_inner();
+    let messages: Vec<_> = ::mcap::MessageStream::new(&bytes).expect("an MCAP").map(|m| m.expect("whole")).collect();
+    assert_eq!(messages.len(), 20 + 20 + 20 + 30);
+    assert_eq!(messages.iter().map(|message| message.log_time).min(), Some(1_000_000_000_000));
+    let triplet = messages.iter().rfind(|message| message.channel.topic == "position_setpoint_triplet");
+    let sample: Value = serde_json::from_slice(&triplet.expect("a message").data).expect("JSON");
+    assert_eq!((sample["current.lat"].as_f64(), sample["previous.valid"].as_f64()), (Some(19.0), Some(1.0)));
 }
 
 #[test]
@@ -170,6 +217,8 @@ mod again {
         assert!(matches!(error, ReflyError::Over), "{error}");
         let error = again(&HOP.log, "eskf.gate=4").expect_err("as a board's own log, it names no world");
         assert!(matches!(error, ReflyError::NoWorld) && error.to_string().contains("stampfly replay"), "{error}");
+        let cut = again(&log[..log.len() - 1], "position.pos.kp=1").expect("a log that was cut off is flown again");
+        assert!(!cut.end.is_whole() && cut.to_string().contains("the log is cut off at byte"), "{cut}");
         let mut other = log.clone();
         let place = other.windows(5).position(|bytes| bytes == b"seed3").expect("a fact") + 4;
         other[place] = b'4';

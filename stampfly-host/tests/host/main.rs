@@ -15,10 +15,13 @@ mod estimate;
 mod fault_campaign;
 mod faults;
 mod figures;
+mod files;
 mod flight_task;
 mod flips;
 mod flown;
 mod flying_quality;
+#[path = "../../../stampfly-lab/tests/lab/foreign_log.rs"]
+mod foreign_log;
 mod ground;
 mod held;
 mod hil;

@@ -4,7 +4,7 @@ use crate::flown::{HOP, Hop, LATE, hop};
 use crate::thorough::thorough;
 use stampfly_board::VehicleConfig;
 use stampfly_board::schedule::Runnables;
-use stampfly_board::simulation::StampFly;
+use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_flight::compact::Samples;
 use stampfly_flight::replay::{Replay, ReplayOptions, replay};
 use stampfly_host::flown::fly;
@@ -15,7 +15,7 @@ use stampfly_lab::flight_log;
 use stampfly_log::ulog::{Message, Reader};
 use stampfly_rover::simulation::Rover;
 use stampfly_sim::vehicle::{Options, Vehicle};
-use stampfly_types::Instant;
+use stampfly_types::{Duration as FlightTime, Instant};
 use std::net::UdpSocket;
 use std::time::Duration;
 
@@ -83,6 +83,30 @@ fn damaged_and_empty_files_are_errors_or_gaps() {
     assert!(again(&log).difference.is_none());
     assert!(matches!(run_again(file, Some("balloon"), Samples::Again), Err(RecordError::Vehicle(_))));
     assert!(matches!(run_again(file, Some("rover"), Samples::Again), Err(RecordError::Read(_))));
+}
+
+/// Cut off anywhere, and with any byte turned over: what is whole is run again, or an error says
+/// what is wrong.
+#[test]
+fn a_record_cut_off_or_damaged_anywhere_is_read_as_far_as_it_is_whole() {
+    let mut witness = RecordOut::memory(StampFly::NAME);
+    fly::<StampFly>(&Setup { limit: FlightTime::from_secs(2), ..hop(1, None) }, &mut witness, &mut |_, _| {});
+    let (file, cuts, bytes) = (witness.file().to_vec(), thorough(40, 1_000), thorough(20, 200));
+    let mut before = 0;
+    for cut in 0..cuts {
+        if let Ok((_, contents)) = as_log(&file[..cut * file.len() / cuts]).map(|(log, contents)| (log.len(), contents))
+        {
+            let activations = contents.map_or(0, |contents| contents.activations);
+            assert!(activations >= before, "cut {cut}: {activations} after {before}");
+            before = activations;
+        }
+    }
+    assert!(before > 1_000, "{before}");
+    for place in (0..bytes).chain((0..bytes).map(|place| place * file.len() / bytes)) {
+        let mut flipped = file.clone();
+        flipped[place] ^= 0xff;
+        let _ = run_again(&flipped, None, Samples::Again);
+    }
 }
 
 #[test]

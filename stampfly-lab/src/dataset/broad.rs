@@ -5,6 +5,7 @@
 //! is half a turn about the line between them.
 
 use super::error::DatasetErrorKind;
+use super::mat;
 use super::npz::{Arrays, broken, numbers};
 use super::recording::{Kind, Recording, TruthPoint, attitude};
 use super::timing::Clock;
@@ -14,6 +15,25 @@ use stampfly_types::{Instant, Vec3};
 
 pub(super) fn is(arrays: &Arrays) -> bool {
     ["gyr", "acc", "mag", "quat", "movement"].iter().all(|name| arrays.contains_key(*name))
+}
+
+/// Names of the arrays as BROAD publishes them, and as they are here.
+const PUBLISHED: [(&str, &str); 7] = [
+    ("imu_gyr", "gyr"),
+    ("imu_acc", "acc"),
+    ("imu_mag", "mag"),
+    ("opt_quat", "quat"),
+    ("opt_pos", "pos"),
+    ("sampling_rate", "fs"),
+    ("movement", "movement"),
+];
+
+/// Reads a trial as BROAD publishes it, `data_mat/NAME.mat`.
+pub(super) fn read_mat(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKind> {
+    let mut published = mat::read(bytes)?;
+    let arrays: Arrays =
+        PUBLISHED.iter().filter_map(|(theirs, ours)| Some(((*ours).to_owned(), published.remove(*theirs)?))).collect();
+    read(name, &arrays)
 }
 
 /// Sensor frame to FRD.

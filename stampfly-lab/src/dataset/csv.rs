@@ -11,7 +11,7 @@ pub(super) struct Table<'a> {
 /// Where some columns are.
 pub(super) struct Columns<const N: usize> {
     names: [&'static str; N],
-    places: [usize; N],
+    pub(super) places: [usize; N],
 }
 
 /// One line, split.
@@ -29,6 +29,12 @@ pub(super) fn rows(bytes: &[u8]) -> impl Iterator<Item = Result<Row<'_>, Dataset
         Ok(text) => Ok(Row { line, cells: text.split(',').map(str::trim).collect() }),
         Err(_) => Err(broken(line, "text", "not UTF-8")),
     })
+}
+
+/// The names in the first line of a text; none where it is no text.
+pub(super) fn header(bytes: &[u8]) -> Vec<&str> {
+    let first = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    std::str::from_utf8(first).map(|text| text.split(',').map(str::trim).collect()).unwrap_or_default()
 }
 
 fn broken(line: usize, field: &str, problem: impl Into<String>) -> DatasetErrorKind {

@@ -39,6 +39,8 @@ pub enum DatasetErrorKind {
         /// What is wrong.
         problem: String,
     },
+    /// It is HDF5, of which MATLAB's version 7.3 is a kind.
+    Hdf5,
     /// There is not one usable inertial sample.
     Empty,
 }
@@ -50,6 +52,7 @@ impl fmt::Display for DatasetErrorKind {
             Self::Unknown { begins } => write!(f, "no known kind of recording begins with `{begins}`"),
             Self::Line { line, field, problem } => write!(f, "line {line}: {field}: {problem}"),
             Self::Array { field, problem } => write!(f, "array {field}: {problem}"),
+            Self::Hdf5 => f.write_str("HDF5 is not read; BROAD has the same trials in data_mat, which are"),
             Self::Empty => f.write_str("no usable inertial sample"),
         }
     }

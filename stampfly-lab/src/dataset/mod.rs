@@ -2,21 +2,26 @@
 //!
 //! | kind | file | reference |
 //! |---|---|---|
-//! | [`Kind::StampFlyLog`] | CSV of 22 or 25 columns, `raw_accel_x` … `dev_yaw_deg` | the flying device's own estimate |
-//! | [`Kind::StampFlyFlight`] | CSV of 7, 11 or 29 columns, `gyro_x` … | 29 columns: the device's own estimate |
-//! | [`Kind::NanoBench`] | NPZ with `t`, `data`, `cols` | motion capture, 100 Hz |
-//! | [`Kind::Broad`] | NPZ with `gyr`, `acc`, `mag`, `quat`, … | motion capture, with gaps |
+//! | [`Kind::StampFlyLog`] | CSV with columns `timestamp_ms`, `raw_accel_x` … `dev_yaw_deg` | the flying device's own estimate |
+//! | [`Kind::StampFlyFlight`] | CSV with columns `timestamp_ms`, `gyro_x`, `accel_x` … | where it has `pos_x` …: the device's own estimate |
+//! | [`Kind::NanoBench`] | CSV as published, `t,px,py,pz,qx,…`; or NPZ with `t`, `data`, `cols` | motion capture, 100 Hz |
+//! | [`Kind::Broad`] | MATLAB 5 as published, `data_mat/*.mat`; or NPZ with `gyr`, `acc`, `mag`, `quat`, `pos`, `movement`, `fs` | motion capture, with gaps |
 //! | [`Kind::Px4Replay`] | CSV lines `time_us,sensor,values…` | EKF2's own states, when their file lies beside it ([`load`]) |
 //!
-//! Which one a file is is found out from its content, never from its name. Everything comes out in SI units, body
-//! FRD, world NED, accelerometer as specific force, whatever the file has. Time stamps are put in order (see
-//! [`Timing`]); what had to be dropped or moved for that is counted, never hidden.
+//! Which one a file is is found out from its content, never from its name; columns are found by
+//! name, in any order. The arrays of an NPZ are those of the published file: `cols` has the names
+//! of the columns of `data`; `gyr` to `fs` are BROAD's `imu_gyr`, `imu_acc`, `imu_mag`, `opt_quat`,
+//! `opt_pos`, `movement` and `sampling_rate`. HDF5 is not read. Everything comes out in SI units,
+//! body FRD, world NED, accelerometer as specific force, whatever the file has. Time stamps are put
+//! in order (see [`Timing`]); what had to be dropped or moved for that is counted, never hidden.
+//! What a file may unpack to is bounded.
 
 mod broad;
 mod csv;
 mod ekf2;
 mod error;
 mod geodetic;
+mod mat;
 mod nanobench;
 mod npz;
 mod px4;
@@ -79,12 +84,19 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKind> {
             let names: Vec<_> = arrays.keys().map(String::as_str).collect();
             Err(DatasetErrorKind::Unknown { begins: format!("NPZ with {}", names.join(", ")) })
         }
+    } else if mat::is(bytes) {
+        broad::read_mat(name, bytes)
+    } else if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {
+        Err(DatasetErrorKind::Hdf5)
     } else {
         let first = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
-        if stampfly::is_log(first) {
+        let header = csv::header(bytes);
+        if stampfly::is_log(&header) {
             stampfly::read_log(name, bytes)
-        } else if stampfly::is_flight(first) {
+        } else if stampfly::is_flight(&header) {
             stampfly::read_flight(name, bytes)
+        } else if nanobench::is_text(&header) {
+            nanobench::read_text(name, bytes)
         } else if px4::is(first) {
             px4::read(name, bytes)
         } else {

@@ -5,8 +5,47 @@ use super::error::DatasetErrorKind;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 
-/// No array of a recording is larger than this; a damaged or hostile archive may claim to be.
-const MAX_BYTES: u64 = 1 << 28;
+/// Bytes of all arrays of a recording, unpacked; a damaged or hostile archive may claim to have
+/// more. BROAD's have 8 million.
+const MAX_BYTES: u64 = 1 << 25;
+/// Numbers in all arrays. BROAD's have one million.
+const MAX_NUMBERS: usize = 1 << 22;
+/// Texts in all arrays: names of columns.
+const MAX_TEXTS: usize = 1 << 14;
+
+/// What may still be read of a file.
+pub(super) struct Budget {
+    bytes: u64,
+    numbers: usize,
+    texts: usize,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { bytes: MAX_BYTES, numbers: MAX_NUMBERS, texts: MAX_TEXTS }
+    }
+}
+
+impl Budget {
+    /// Unpacks all of it.
+    pub(super) fn read(&mut self, from: impl Read) -> Result<Vec<u8>, String> {
+        let mut content = Vec::new();
+        from.take(self.bytes + 1).read_to_end(&mut content).map_err(|error| error.to_string())?;
+        self.bytes = self.bytes.checked_sub(content.len() as u64).ok_or("larger than any recording")?;
+        Ok(content)
+    }
+
+    /// So many numbers will be read.
+    pub(super) fn elements(&mut self, count: usize) -> Result<(), &'static str> {
+        self.numbers = self.numbers.checked_sub(count).ok_or("larger than any recording")?;
+        Ok(())
+    }
+
+    fn texts(&mut self, count: usize) -> Result<(), &'static str> {
+        self.texts = self.texts.checked_sub(count).ok_or("larger than any recording")?;
+        Ok(())
+    }
+}
 
 /// The elements of an array, first row first.
 pub(super) enum Elements {
@@ -36,23 +75,20 @@ pub(super) fn broken(field: &str, problem: impl ToString) -> DatasetErrorKind {
 pub(super) fn read(bytes: &[u8]) -> Result<Arrays, DatasetErrorKind> {
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken("archive", error))?;
     let mut arrays = BTreeMap::new();
+    let mut budget = Budget::default();
     for index in 0..archive.len() {
         let entry = archive.by_index(index).map_err(|error| broken("archive", error))?;
         let name = entry.name().map_err(|error| broken("archive", error))?.into_owned();
         let name = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
-        let mut content = Vec::new();
-        entry.take(MAX_BYTES + 1).read_to_end(&mut content).map_err(|error| broken(&name, error))?;
-        if content.len() as u64 > MAX_BYTES {
-            return Err(broken(&name, "larger than any recording"));
-        }
-        let array = parse(&content).map_err(|problem| broken(&name, problem))?;
+        let content = budget.read(entry).map_err(|problem| broken(&name, problem))?;
+        let array = parse(&content, &mut budget).map_err(|problem| broken(&name, problem))?;
         arrays.insert(name, array);
     }
     Ok(arrays)
 }
 
 /// Takes one `.npy` file apart.
-fn parse(content: &[u8]) -> Result<Array, &'static str> {
+fn parse(content: &[u8], budget: &mut Budget) -> Result<Array, &'static str> {
     let rest = content.strip_prefix(b"\x93NUMPY").ok_or("not a NumPy array")?;
     let (version, rest) = rest.split_first_chunk::<2>().ok_or("cut off")?;
     let (length, rest) = match version[0] {
@@ -78,7 +114,11 @@ fn parse(content: &[u8]) -> Result<Array, &'static str> {
     };
     let count = rows.checked_mul(columns).ok_or("shape is too large")?;
 
-    let number = |size: usize, read: fn(&[u8]) -> Option<f64>| -> Result<Elements, &'static str> {
+    let mut number = |size: usize, read: fn(&[u8]) -> Option<f64>| -> Result<Elements, &'static str> {
+        if data.len() / size < count {
+            return Err(SHORT);
+        }
+        budget.elements(count)?;
         let values = data.chunks_exact(size).take(count).map_while(read).collect();
         Ok(Elements::Numbers(ordered(values, rows, columns, by_columns)?))
     };
@@ -91,6 +131,10 @@ fn parse(content: &[u8]) -> Result<Array, &'static str> {
         _ => {
             let width: usize = kind.strip_prefix("<U").and_then(|width| width.parse().ok()).ok_or("unknown type")?;
             let size = width.checked_mul(4).filter(|size| *size > 0).ok_or("unknown type")?;
+            if data.len() / size < count {
+                return Err(SHORT);
+            }
+            budget.texts(count)?;
             let texts = data.chunks_exact(size).take(count).map(|text| {
                 let characters = text.chunks_exact(4).filter_map(|c| c.first_chunk().map(|c| u32::from_le_bytes(*c)));
                 characters.take_while(|c| *c != 0).map(|c| char::from_u32(c).unwrap_or('\u{fffd}')).collect()
@@ -107,10 +151,18 @@ fn value_of<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     Some(rest.trim_start().strip_prefix(':')?.trim_start())
 }
 
+/// Why an array is refused whose bytes end early.
+const SHORT: &str = "fewer elements than its shape says";
+
 /// Row after row, from either order.
-fn ordered<T: Clone>(values: Vec<T>, rows: usize, columns: usize, by_columns: bool) -> Result<Vec<T>, &'static str> {
+pub(super) fn ordered<T: Clone>(
+    values: Vec<T>,
+    rows: usize,
+    columns: usize,
+    by_columns: bool,
+) -> Result<Vec<T>, &'static str> {
     if Some(values.len()) != rows.checked_mul(columns) {
-        return Err("fewer elements than its shape says");
+        return Err(SHORT);
     }
     if !by_columns || columns <= 1 {
         return Ok(values);
@@ -146,7 +198,7 @@ mod tests {
         let c = npy("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", &bytes(&[1., 2., 3., 4., 5., 6.]));
         let f = npy("{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }", &bytes(&[1., 4., 2., 5., 3., 6.]));
         for file in [c, f] {
-            let arrays = BTreeMap::from([("a".to_owned(), parse(&file).unwrap())]);
+            let arrays = BTreeMap::from([("a".to_owned(), parse(&file, &mut Budget::default()).unwrap())]);
             assert_eq!(numbers::<3>(&arrays, "a").unwrap(), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
         }
     }
@@ -154,11 +206,11 @@ mod tests {
     #[test]
     fn lies_are_found() {
         let short = npy("{'descr': '<f4', 'fortran_order': False, 'shape': (9,), }", &[0; 35]);
-        assert_eq!(parse(&short).err(), Some("fewer elements than its shape says"));
+        assert_eq!(parse(&short, &mut Budget::default()).err(), Some("fewer elements than its shape says"));
         let huge = npy("{'descr': '<f4', 'fortran_order': True, 'shape': (99999999999, 99999999999), }", &[]);
-        assert_eq!(parse(&huge).err(), Some("shape is too large"));
+        assert_eq!(parse(&huge, &mut Budget::default()).err(), Some("shape is too large"));
         let kind = npy("{'descr': '>c16', 'fortran_order': False, 'shape': (1,), }", &[0; 16]);
-        assert_eq!(parse(&kind).err(), Some("unknown type"));
-        assert_eq!(parse(b"\x93NUMPY\x01").err(), Some("cut off"));
+        assert_eq!(parse(&kind, &mut Budget::default()).err(), Some("unknown type"));
+        assert_eq!(parse(b"\x93NUMPY\x01", &mut Budget::default()).err(), Some("cut off"));
     }
 }

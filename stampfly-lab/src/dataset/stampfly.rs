@@ -1,6 +1,6 @@
 //! What StampFlys recorded themselves. Body FRD, world NED and SI units already; angles in degrees.
 
-use super::csv::{Row, Table};
+use super::csv::{Columns, Row, Table};
 use super::error::DatasetErrorKind;
 use super::recording::{DevicePoint, Kind, Recording};
 use super::timing::{Clock, Held};
@@ -27,16 +27,19 @@ const FLOW_PERIOD: Duration = Duration::from_millis(10);
 const MAG_PERIOD: Duration = Duration::from_millis(40);
 const BARO_PERIOD: Duration = Duration::from_millis(70);
 
-pub(super) fn is_log(first_line: &[u8]) -> bool {
-    first_line.starts_with(b"timestamp_ms,dt_ms,raw_accel_x,")
+/// Is it the first line of a sensor log? The columns may be in any order, among others.
+pub(super) fn is_log(header: &[&str]) -> bool {
+    ["timestamp_ms", "raw_accel_x", "raw_gyro_x"].iter().all(|name| header.contains(name))
 }
 
-pub(super) fn is_flight(first_line: &[u8]) -> bool {
-    first_line.starts_with(b"timestamp_ms,gyro_x,") || first_line.starts_with(b"timestamp_ms,roll_deg,")
+/// Is it the first line of a flight capture?
+pub(super) fn is_flight(header: &[&str]) -> bool {
+    ["timestamp_ms", "accel_x", "gyro_x"].iter().all(|name| header.contains(name))
 }
 
-fn stamp(row: &Row<'_>) -> Result<Instant, DatasetErrorKind> {
-    row.micros(0, "timestamp_ms", 1_000.0)
+fn stamp(row: &Row<'_>, clock: &Columns<1>) -> Result<Instant, DatasetErrorKind> {
+    let [place] = clock.places;
+    row.micros(place, "timestamp_ms", 1_000.0)
 }
 
 fn vector([x, y, z]: [f64; 3]) -> Vec3 {
@@ -78,6 +81,7 @@ pub(super) fn standard_pressure(altitude: f32) -> f32 {
 /// Sensor log: 25 columns, 22 without the magnetometer.
 pub(super) fn read_log(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKind> {
     let table = Table::new(bytes)?;
+    let clock = table.columns(["timestamp_ms"])?;
     let inertial =
         table.columns(["raw_accel_x", "raw_accel_y", "raw_accel_z", "raw_gyro_x", "raw_gyro_y", "raw_gyro_z"])?;
     let field = table.maybe(["raw_mag_x", "raw_mag_y", "raw_mag_z"])?;
@@ -102,7 +106,7 @@ pub(super) fn read_log(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErr
     let mut new_baro = Held::new(BARO_PERIOD);
     for row in table.rows() {
         let row = row?;
-        let at = stamp(&row)?;
+        let at = stamp(&row, &clock)?;
         rows.push(imu(at, inertial.read(&row)?));
         poses.push(device(at, own.read(&row)?));
         let [altitude, distance, quality, dx, dy] = others.read(&row)?;
@@ -138,6 +142,7 @@ pub(super) fn read_log(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErr
 /// Flight capture: 29 columns, or 7 or 11 with inertial samples only.
 pub(super) fn read_flight(name: &str, bytes: &[u8]) -> Result<Recording, DatasetErrorKind> {
     let table = Table::new(bytes)?;
+    let clock = table.columns(["timestamp_ms"])?;
     let inertial = table.columns(["accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"])?;
     let field = table.maybe(["mag_x", "mag_y", "mag_z"])?;
     let down = table.maybe(["tof_bottom"])?;
@@ -149,7 +154,7 @@ pub(super) fn read_flight(name: &str, bytes: &[u8]) -> Result<Recording, Dataset
     let mut new_mag = Held::new(MAG_PERIOD);
     for row in table.rows() {
         let row = row?;
-        let at = stamp(&row)?;
+        let at = stamp(&row, &clock)?;
         rows.push(imu(at, inertial.read(&row)?));
         if let Some(own) = &own {
             poses.push(device(at, own.read(&row)?));

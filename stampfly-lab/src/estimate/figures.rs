@@ -55,6 +55,8 @@ pub struct Figures {
     pub receiver: Option<AgainstReceiver>,
     /// Stretches in which the reference was not seen. They are not compared.
     pub truth_gaps: usize,
+    /// Inertial samples that were left out because the recording's clock had gone back before them.
+    pub clock_back: usize,
     /// Instants that were compared with the reference.
     pub truth_samples: usize,
     /// Share of a sensor's samples that disagreed with the estimate and were left out.
@@ -114,6 +116,7 @@ impl Figures {
             velocity_rmse_mps: accuracy.velocity_rms(),
             receiver: AgainstReceiver::of(recording, start, drive, receiver),
             truth_gaps: recording.truth_gaps,
+            clock_back: recording.timing.backwards,
             truth_samples: accuracy.samples(),
             rejected: share(|tally| tally.gated),
             unused: share(|tally| tally.refused),

@@ -1,10 +1,11 @@
 //! Logs of ours and of others, whole and broken, become series.
 
+use crate::foreign_log::{begun, format, hostile, px4_like, sample, subscribe};
 use proptest::prelude::*;
 use stampfly_lab::flight_log::{self, LogErrorKind, Omission};
-use stampfly_log::ulog::{Definitions, Level, ReadErrorKind, Sample, Sink, Topic};
+use stampfly_log::ulog::{Definitions, End, Level, ReadErrorKind, Sample, Sink, Topic};
 use stampfly_types::messages::{FlightStatus, StateEstimate};
-use stampfly_types::{Instant, Message};
+use stampfly_types::{Duration, Instant, Message};
 
 struct Bytes(Vec<u8>);
 
@@ -16,7 +17,8 @@ impl Sink for Bytes {
     }
 }
 
-fn log() -> Vec<u8> {
+/// A small log of ours.
+pub fn log() -> Vec<u8> {
     let topics = [
         Topic { name: "estimate_state", fields: StateEstimate::FIELDS },
         Topic { name: "flight_status", fields: FlightStatus::FIELDS },
@@ -44,8 +46,8 @@ fn log() -> Vec<u8> {
 fn our_log_becomes_series_with_units_and_names() {
     let log = flight_log::parse(&log()).unwrap();
     assert_eq!(log.omissions, []);
-    assert_eq!(log.started, Instant::from_micros(500));
     let flight = log.flight;
+    assert_eq!(flight.started, Instant::from_micros(500));
     let estimate = &flight.topics["estimate_state"];
     assert_eq!(estimate.at.len(), 50);
     assert_eq!(estimate.column("height").unwrap(), (0..50).map(f64::from).collect::<Vec<_>>());
@@ -68,6 +70,7 @@ fn a_cut_off_log_gives_what_is_there_and_names_the_place() {
     let [Omission::Damage(error)] = log.omissions[..] else { panic!("{:?}", log.omissions) };
     assert_eq!(error.kind, ReadErrorKind::Truncated);
     assert!(error.offset < bytes.len() && error.offset + 300 > bytes.len());
+    assert_eq!(log.end, End::Cut { at: error.offset, rest: bytes.len() - error.offset });
 }
 
 #[test]
@@ -107,12 +110,71 @@ fn foreign_topics_are_taken_where_possible_and_listed_where_not() {
         log.omissions,
         [Omission::ShortSamples { topic: "esc[2]".to_owned(), count: 1 }, Omission::UnknownData { id: 9, count: 1 },]
     );
-    let nested = flight_log::parse(&foreign("esc:uint64_t timestamp;report[4] r;", &[&[0; 40]])).unwrap();
-    let reason = "type `report` is not a basic one".to_owned();
-    assert_eq!(nested.omissions[0], Omission::Topic { topic: "esc".to_owned(), reason });
-    assert!(nested.flight.topics.is_empty());
+    let unknown = flight_log::parse(&foreign("esc:uint64_t timestamp;report[4] r;", &[&[0; 40]])).unwrap();
+    let reason = "type `report` is neither a basic one nor a format of the log".to_owned();
+    assert_eq!(unknown.omissions[0], Omission::Topic { topic: "esc".to_owned(), reason });
+    assert!(unknown.flight.topics.is_empty());
     let timeless = flight_log::parse(&foreign("esc:float value;", &[&[0; 4]])).unwrap();
     assert!(matches!(&timeless.omissions[0], Omission::Topic { reason, .. } if reason.contains("timestamp")));
+}
+
+#[test]
+fn formats_within_formats_are_columns_as_pyulog_names_them() {
+    let log = flight_log::parse(&px4_like()).unwrap();
+    assert_eq!((log.end, &log.omissions[..]), (End::Whole, &[][..]));
+    let names = |topic: &str| -> Vec<String> {
+        log.flight.topics[topic].columns.iter().map(|column| column.name.clone()).collect()
+    };
+    let inner = ["timestamp", "lat", "yaw", "valid"];
+    let expected = ["previous", "current"].iter().flat_map(|outer| inner.map(|inner| format!("{outer}.{inner}")));
+    assert_eq!(names("position_setpoint_triplet"), expected.collect::<Vec<_>>());
+    assert_eq!(names("esc_status")[4], "esc[0].esc_voltage[1]");
+    let triplet = &log.flight.topics["position_setpoint_triplet"];
+    assert_eq!(triplet.column("current.lat").unwrap(), (0..20).map(f64::from).collect::<Vec<_>>());
+    let esc = &log.flight.topics["esc_status"];
+    assert_eq!(esc.column("esc[3].esc_rpm").unwrap(), (300..320).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(esc.column("esc[2].esc_voltage[1]").unwrap()[5], 205.0);
+    assert_eq!(esc.column("counter").unwrap()[19], 19.0);
+}
+
+#[test]
+fn instances_and_topics_declared_twice_are_read() {
+    let log = flight_log::parse(&px4_like()).unwrap();
+    let [first, second] = ["sensor_accel", "sensor_accel[1]"].map(|name| &log.flight.topics[name]);
+    assert_eq!((first.at.len(), second.at.len()), (20, 30));
+    assert_eq!((first.column("x").unwrap()[19], second.column("x").unwrap()[29]), (21.0, 100.0));
+
+    // Another format of the same name is a series of its own, and of the same name again the first.
+    let mut other = begun(1);
+    for (id, fields) in [(1, "float a;"), (2, "float b;"), (3, "float a;")] {
+        format(&mut other, &format!("x:uint64_t timestamp;{fields}"));
+        subscribe(&mut other, id, 0, "x");
+        sample(&mut other, id, 10 * u64::from(id), &f32::from(id).to_le_bytes());
+    }
+    let topics = flight_log::parse(&other).unwrap().flight.topics;
+    assert_eq!(topics["x"].column("a"), Some(&[1.0, 3.0][..]));
+    assert_eq!(topics["x#2"].column("b"), Some(&[2.0][..]));
+}
+
+#[test]
+fn a_stamp_of_zero_is_no_time() {
+    let log = flight_log::parse(&px4_like()).unwrap();
+    assert_eq!(log.flight.topics["position_setpoint_triplet"].at[0], Instant::ZERO, "the sample is kept");
+    let start = Instant::from_secs(1_000);
+    assert_eq!(log.flight.span(), Some((start, start + Duration::from_millis(195))));
+}
+
+#[test]
+fn small_files_that_claim_much_cost_little() {
+    for (what, bytes) in hostile() {
+        let began = std::time::Instant::now();
+        let log = flight_log::parse(&bytes).unwrap();
+        let columns: usize = log.flight.topics.values().map(|series| series.columns.len()).sum();
+        let took = began.elapsed();
+        println!("{what}: {} bytes, {columns} columns, {} omissions, {took:?}", bytes.len(), log.omissions.len());
+        assert!(took.as_secs_f64() < 2.0, "{what}: {took:?}");
+        assert!(columns <= 1 << 16 && log.flight.topics.len() <= 4_096 && log.omissions.len() <= 101, "{what}");
+    }
 }
 
 proptest! {

@@ -4,8 +4,10 @@
 mod attitude;
 mod calibration;
 mod consistency;
+mod damaged_files;
 mod estimate;
 mod flight_log;
+mod foreign_log;
 mod hostile_recordings;
 mod receiver;
 mod recorded;

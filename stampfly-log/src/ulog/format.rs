@@ -1,7 +1,9 @@
 //! Formats: what the bytes of a sample mean, as the file itself says.
 //!
-//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per scalar, arrays
-//! spread out. To get the exact words of one of our own messages back, use [`Topic::decode`](super::Topic::decode).
+//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per
+//! scalar, arrays spread out; [`Format::unfolded`] is the same where fields may be formats
+//! themselves. To get the exact words of one of our own messages back, use
+//! [`Topic::decode`](super::Topic::decode).
 
 use core::fmt;
 
@@ -100,6 +102,12 @@ pub enum FieldError<'a> {
     Nested(&'a str),
     /// With this field a sample would be longer than a message can be.
     TooLong(&'a str),
+    /// A type that is neither a basic one nor a format of the log.
+    Unknown(&'a str),
+    /// A format that holds itself, or is too deep in others.
+    TooDeep(&'a str),
+    /// More fields than a sample can have.
+    TooMany,
 }
 
 impl fmt::Display for FieldError<'_> {
@@ -108,6 +116,9 @@ impl fmt::Display for FieldError<'_> {
             Self::Syntax(text) => write!(f, "`{text}` is no field declaration"),
             Self::Nested(name) => write!(f, "type `{name}` is not a basic one"),
             Self::TooLong(text) => write!(f, "with `{text}` a sample is longer than a message"),
+            Self::Unknown(name) => write!(f, "type `{name}` is neither a basic one nor a format of the log"),
+            Self::TooDeep(name) => write!(f, "`{name}` holds itself, or formats are too deep in one another"),
+            Self::TooMany => f.write_str("its fields are too many"),
         }
     }
 }

@@ -24,24 +24,28 @@
 //!   `Init=0 IdleGround=1 …`; for flags the number is the bit mask.
 //! * Each activation of a runnable is a topic `activation_…`, see [`crate::trace`].
 //!
-//! Use [`Definitions`] and [`Writer`] to write, [`Reader`] to read. Reading takes logs of any origin; nested formats
-//! are reported, not unfolded.
+//! Use [`Definitions`] and [`Writer`] to write, [`Reader`] to read. Reading takes logs of any
+//! origin. A format whose fields are formats again is unfolded by [`Format::unfolded`].
 
 mod cursor;
+mod end;
 mod format;
 mod message;
 mod reader;
 mod schema;
 mod sink;
 mod topic;
+mod unfold;
 mod writer;
 
+pub use end::End;
 pub use format::{Column, Columns, Declaration, FieldError, Format, Scalar};
 pub use message::{FlagBits, Level, Message, ParameterValue};
 pub use reader::{ReadError, ReadErrorKind, Reader};
 pub use schema::Schema;
 pub use sink::{Full, Ram, Sink, WriteError};
 pub use topic::{Sample, Stamp, Topic};
+pub use unfold::{Path, Unfolded, UnfoldedColumn};
 pub use writer::{Definitions, Writer};
 
 pub(crate) use cursor::{Take, put_u16};

@@ -1,10 +1,12 @@
 //! Reading a log of any origin, borrowed, without a way to panic or to loop for ever.
 //!
-//! The reader yields messages in file order. Damage is an item of its own and not the end: a message whose inside
-//! is broken is skipped, and after damage to the framing reading goes on at the next [`Message::Sync`] or at the
-//! next appended part. Whoever wants nothing but intact logs stops at the first error.
+//! The reader yields messages in file order. Damage is an item of its own and not the end: a
+//! message whose inside is broken is skipped, and after damage to the framing reading goes on at
+//! the next [`Message::Sync`] or at the next appended part. A program that wants intact logs alone
+//! stops at the first error; all others read on and say with [`Reader::end`] how far the log is
+//! whole.
 
-use super::{FlagBits, HEADER, MAGIC, Message, SYNC_MAGIC, Take};
+use super::{End, FlagBits, HEADER, MAGIC, Message, SYNC_MAGIC, Take};
 use core::fmt;
 use stampfly_types::Instant;
 
@@ -23,6 +25,9 @@ pub enum ReadErrorKind {
     Truncated,
     /// No message of ULog has this type, so the place where messages begin has been lost.
     LostFraming(u8),
+    /// Nothing that is a message begins behind this one, so bytes of it may be missing, and those
+    /// of the next be in it.
+    NotFollowed,
 }
 
 /// Where and how a log is broken.
@@ -46,6 +51,9 @@ impl fmt::Display for ReadError {
             ReadErrorKind::Truncated => write!(f, "the message at byte {offset} is cut off"),
             ReadErrorKind::LostFraming(kind) => {
                 write!(f, "no message begins at byte {offset} (type {kind:#04x})")
+            }
+            ReadErrorKind::NotFollowed => {
+                write!(f, "the message at byte {offset} may be missing bytes: no message begins behind it")
             }
         }
     }
@@ -76,6 +84,7 @@ pub struct Reader<'a> {
     at: usize,
     started: Instant,
     flags: FlagBits,
+    end: End,
 }
 
 impl<'a> Reader<'a> {
@@ -88,7 +97,7 @@ impl<'a> Reader<'a> {
         let mut take = Take(bytes.strip_prefix(&MAGIC).ok_or(not_ulog)?);
         let _version = take.u8().ok_or(not_ulog)?;
         let started = Instant::from_micros(take.u64().ok_or(not_ulog)?);
-        let mut reader = Self { bytes, at: HEADER, started, flags: FlagBits::default() };
+        let mut reader = Self { bytes, at: HEADER, started, flags: FlagBits::default(), end: End::Whole };
         if let Some(Ok(Message::FlagBits(flags))) = reader.clone().next() {
             if !flags.is_readable() {
                 return Err(ReadError { offset: HEADER, kind: ReadErrorKind::Incompatible });
@@ -110,9 +119,50 @@ impl<'a> Reader<'a> {
         self.at
     }
 
+    /// How far the log is whole, as far as it has been read: complete when the iterator has ended.
+    ///
+    /// ```
+    /// use stampfly_log::ulog::{Definitions, End, Ram, Reader};
+    /// use stampfly_types::Instant;
+    ///
+    /// let mut memory = [0; 256];
+    /// let mut log = Definitions::start(Ram::new(&mut memory), Instant::ZERO)?;
+    /// log.info("sys_name", "StampFly")?;
+    /// let log = log.data(&[][..])?;
+    /// let whole = log.sink().written();
+    /// let mut reader = Reader::new(&whole[..whole.len() - 1]).expect("a ULog");
+    /// assert_eq!(reader.by_ref().filter(Result::is_err).count(), 1);
+    /// assert_eq!(reader.end().to_string(), "cut off at byte 59: the last 27 bytes are no whole message");
+    /// # Ok::<(), stampfly_log::ulog::WriteError<stampfly_log::ulog::Full>>(())
+    /// ```
+    #[must_use]
+    pub const fn end(&self) -> End {
+        self.end
+    }
+
+    /// Goes on behind damage, and remembers what it cost.
+    fn skip(&mut self, to: usize, kind: ReadErrorKind) -> Option<Result<Message<'a>, ReadError>> {
+        let offset = core::mem::replace(&mut self.at, to);
+        let skipped = to - offset;
+        self.end = match self.end {
+            End::Whole if kind == ReadErrorKind::Truncated && to == self.bytes.len() => {
+                End::Cut { at: offset, rest: skipped }
+            }
+            End::Whole => End::Damaged { at: offset, places: 1, skipped },
+            // Nothing follows a cut.
+            End::Cut { at, rest } => End::Cut { at, rest },
+            End::Damaged { at, places, skipped: before } => {
+                End::Damaged { at, places: places + 1, skipped: before + skipped }
+            }
+        };
+        Some(Err(ReadError { offset, kind }))
+    }
+
     /// End of the part that holds offset `at`: the nearest appended part behind it, or the end of the file.
     fn part_end(&self, at: usize) -> usize {
-        let offsets = self.flags.appended.iter().filter_map(|offset| usize::try_from(*offset).ok());
+        let is_appended = self.flags.incompatible[0] & FlagBits::DATA_APPENDED != 0;
+        let offsets = self.flags.appended.iter().filter(|_| is_appended);
+        let offsets = offsets.filter_map(|offset| usize::try_from(*offset).ok());
         offsets.filter(|offset| *offset > at).min().unwrap_or(usize::MAX).min(self.bytes.len())
     }
 
@@ -149,15 +199,23 @@ impl<'a> Iterator for Reader<'a> {
             .and_then(|size| take.bytes(usize::from(size)))
             .filter(|payload| payload.len() < SUSPICIOUS || find_mark(payload).is_none());
         let (Some(kind), Some(payload)) = (kind, payload) else {
-            self.at = self.resume(offset);
-            return Some(Err(ReadError { offset, kind: ReadErrorKind::Truncated }));
+            return self.skip(self.resume(offset), ReadErrorKind::Truncated);
         };
         // Types to come will be letters as well; anything else means that this is no message.
         if !kind.is_ascii_alphanumeric() {
-            self.at = self.resume(offset);
-            return Some(Err(ReadError { offset, kind: ReadErrorKind::LostFraming(kind) }));
+            return self.skip(self.resume(offset), ReadErrorKind::LostFraming(kind));
         }
-        self.at = offset + part.len() - take.0.len();
-        Some(Message::parse(kind, payload).ok_or(ReadError { offset, kind: ReadErrorKind::Malformed(kind) }))
+        // Flags and marks are of one length, and a log without its flags could be another than it
+        // seems.
+        let is_followed = take.0.get(2).is_none_or(u8::is_ascii_alphanumeric);
+        if !is_followed && !matches!(kind, b'B' | b'S') {
+            return self.skip(self.resume(offset), ReadErrorKind::NotFollowed);
+        }
+        let behind = offset + part.len() - take.0.len();
+        let Some(message) = Message::parse(kind, payload) else {
+            return self.skip(behind, ReadErrorKind::Malformed(kind));
+        };
+        self.at = behind;
+        Some(Ok(message))
     }
 }

@@ -3,7 +3,7 @@
 use crate::common::{TOPICS, small_log};
 use proptest::prelude::*;
 use stampfly_log::ulog::{
-    FieldError, FlagBits, Format, Level, Message, ParameterValue, ReadError, ReadErrorKind, Reader,
+    End, FieldError, FlagBits, Format, Level, Message, ParameterValue, ReadError, ReadErrorKind, Reader,
 };
 use stampfly_types::Instant;
 
@@ -171,6 +171,39 @@ fn a_log_cut_off_anywhere_gives_all_that_was_whole() {
         assert_eq!(read_all(&log[..length]), (whole, cut), "{length}");
     }
     assert!((0..16).all(|length| Reader::new(&log[..length]).is_err()));
+}
+
+#[test]
+fn the_end_says_what_was_not_read() {
+    let end = |log: &[u8]| {
+        let mut reader = Reader::new(log).unwrap();
+        reader.by_ref().for_each(drop);
+        reader.end()
+    };
+    let log = small_log();
+    assert_eq!(end(&log), End::Whole);
+    let mut whole = vec![16];
+    let mut reader = Reader::new(&log).unwrap();
+    while reader.next().is_some() {
+        whole.push(reader.offset());
+    }
+    for length in 16..log.len() {
+        let at = whole[whole.partition_point(|end| *end <= length) - 1];
+        let expected = if at == length { End::Whole } else { End::Cut { at, rest: length - at } };
+        assert_eq!(end(&log[..length]), expected, "{length}");
+    }
+    // A message that is none, twice: the text of a format that is no text.
+    let formats: Vec<_> = whole.windows(2).filter(|ends| log.get(ends[0] + 2) == Some(&b'F')).take(2).collect();
+    let mut damaged = log.clone();
+    formats.iter().for_each(|ends| damaged[ends[0] + 3] = 0xff);
+    let (at, skipped) = (formats[0][0], formats.iter().map(|ends| ends[1] - ends[0]).sum());
+    assert_eq!(end(&damaged), End::Damaged { at, places: 2, skipped });
+    let sentence = format!("damaged at byte {at} and in 1 places more: {skipped} bytes were passed over");
+    assert_eq!(end(&damaged).to_string(), sentence);
+    // Zeros at the end, as a disk leaves them, are damage: no message begins so, and the last one
+    // before may be part of it.
+    let (zeros, last) = ([&log[..], &[0; 100]].concat(), whole[whole.len() - 2]);
+    assert_eq!(end(&zeros), End::Damaged { at: last, places: 1, skipped: zeros.len() - last });
 }
 
 #[test]

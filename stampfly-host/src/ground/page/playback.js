@@ -5,6 +5,9 @@ const playback = { vehicle: null, playing: false, last: 0 };
 const openLog = async (file) => {
   try {
     const parsed = readLog(await file.arrayBuffer());
+    log(`${file.name}: ${parsed.topics.size} topics${parsed.short ? `, ${parsed.short} samples left out` : ''}`);
+    if (parsed.end.places) log(`${file.name}: the log is ${sayEnd(parsed.end)}`, 'bad');
+    for (const omission of parsed.omissions.slice(0, 5)) log(`${file.name}: ${omission}`, 'bad');
     const vehicle = vehicleOfLog(parsed, file.name, cards());
     playback.vehicle = vehicle;
     playback.playing = false;
@@ -15,7 +18,6 @@ const openLog = async (file) => {
     setText(element('log-name'), `${file.name} · ${vehicle.card.kind || 'unknown vehicle'} · ${(vehicle.end - vehicle.start).toFixed(1)} s`);
     choose(null);
     for (const [at, text] of parsed.texts.slice(-50)) log(`${at.toFixed(2)} s ${text}`);
-    log(`${file.name}: ${parsed.topics.size} topics${parsed.damaged ? `, ${parsed.damaged} samples left out` : ''}`);
   } catch (error) {
     log(`${file.name}: ${error.message}`, 'bad');
   }

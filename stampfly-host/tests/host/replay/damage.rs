@@ -1,10 +1,12 @@
-//! A log that was damaged anywhere: an error, a difference or nothing, but never a panic.
+//! A log that was damaged anywhere: an error, a difference, an end or nothing, but never a panic.
 
 use super::places::{Place, key_frame_parts, places};
 use super::{record, replay, replay_from};
 use crate::flown::hop;
+use crate::thorough::thorough;
 use proptest::prelude::*;
 use stampfly_board::simulation::Setup;
+use stampfly_flight::replay::ReplayError;
 use stampfly_types::{Duration, Instant};
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -12,6 +14,41 @@ use std::sync::LazyLock;
 /// The first second of a flight: small enough to be damaged many times.
 static SECOND: LazyLock<Vec<u8>> =
     LazyLock::new(|| record(&Setup { limit: Duration::from_secs(1), ..hop(1, Some(1)) }));
+
+/// What is whole is the same flight, wherever it ends.
+#[test]
+fn cut_off_anywhere_it_replays_up_to_there() {
+    let (log, cuts) = (&*SECOND, thorough(60, 1_000));
+    let mut before = 0;
+    for cut in 0..cuts {
+        let length = cut * log.len() / cuts;
+        match replay(&log[..length]) {
+            Ok(result) => {
+                assert_eq!((&result.difference, result.gaps), (&None, 0), "cut at {length}");
+                assert!(result.activations >= before, "cut at {length}: {result:?}");
+                before = result.activations;
+            }
+            Err(error) => {
+                assert!(
+                    matches!(error, ReplayError::Log(_) | ReplayError::NoActivations | ReplayError::NoneLeft(_)),
+                    "cut at {length}: {error}"
+                );
+                assert_eq!(before, 0, "cut at {length}: {error}");
+            }
+        }
+    }
+    assert!(before > 1_000, "{before}");
+}
+
+#[test]
+fn bytes_turned_over_never_panic() {
+    let (log, bytes) = (&*SECOND, thorough(20, 200));
+    for place in (0..bytes).chain((0..bytes).map(|place| place * log.len() / bytes)) {
+        let mut flipped = log.clone();
+        flipped[place] ^= 0xff;
+        let _ = replay(&flipped);
+    }
+}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]

@@ -4,7 +4,7 @@ mod damage;
 mod places;
 
 use crate::flown::{HOP, Hop, LATE, hop};
-use crate::thorough::thorough;
+use crate::thorough::{is_thorough, thorough};
 use places::{find, key_frame_parts, messages, offset, places, without, without_key_frames};
 use stampfly_board::schedule::{ACTIVATIONS, Runnables};
 use stampfly_board::simulation::{Setup, StampFly};
@@ -13,7 +13,7 @@ use stampfly_flight::replay::{self, Difference, Replay, ReplayError, ReplayOptio
 use stampfly_host::flown::fly;
 use stampfly_host::recorder::{Memory, Recorder};
 use stampfly_log::ActivationTopic;
-use stampfly_log::ulog::{Definitions, Message, ReadErrorKind, Reader, Sample, Topic, Writer};
+use stampfly_log::ulog::{Definitions, End, Message, ReadErrorKind, Reader, Sample, Topic, Writer};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::{ImuData, PowerData};
 use stampfly_types::{ActivationRecord, Duration, InputRecord, Instant, Message as _};
@@ -253,16 +253,53 @@ fn the_last_output_missing_its_activation_is_found() {
 }
 
 #[test]
-fn a_log_that_was_cut_off_is_refused_with_the_place() {
+fn a_log_that_was_cut_off_replays_up_to_there() {
     let log = &HOP.log;
     let place = find(log, "sensor_imu", Instant::from_secs(7));
-    let cut = place.payload.start + 3;
-    match replay(&log[..cut]) {
-        Err(ReplayError::Log(error)) => {
-            assert_eq!((error.kind, error.offset), (ReadErrorKind::Truncated, place.message().start));
-        }
-        other => panic!("{other:?}"),
+    let at = place.message().start;
+    let whole = replay(&log[..at]).expect("a log that can be replayed");
+    for length in thorough(&[at + 1, at + 7][..], &[at + 1, at + 2, at + 3, at + 7, place.payload.end - 1][..]) {
+        let result = replay(&log[..*length]).expect("a log that can be replayed");
+        assert_eq!(result.end, End::Cut { at, rest: length - at });
+        assert_eq!(Replay { end: End::Whole, ..result }, whole, "cut at {length}");
     }
+    // In its head there is nothing to replay.
+    assert!(matches!(replay(&log[..1_000]), Err(ReplayError::NoneLeft(End::Cut { .. }))));
+}
+
+/// Where the log is damaged, the replay goes on at the next key frame.
+#[test]
+fn a_damaged_log_replays_where_it_is_whole() {
+    let log = &HOP.log;
+    let whole = replay(log).expect("a log that can be replayed");
+    let marks = Reader::new(log).expect("a log").filter(|message| *message == Ok(Message::Sync)).count();
+    assert_eq!(marks as u64, whole.key_frames, "a mark before each key frame");
+    let at = find(log, "sensor_imu", Instant::from_secs(5)).message().start;
+    let mut damages = vec![("lost bytes", [&log[..at + 5], &log[at + 9..]].concat())];
+    if is_thorough() {
+        let mut zeros = log.clone();
+        zeros[at..at + 4096].fill(0);
+        damages.push(("zeros", zeros));
+    }
+    for (what, damaged) in damages {
+        let result = replay(&damaged).expect("a log that can be replayed");
+        let End::Damaged { at: told, skipped, .. } = result.end else { panic!("{what}: {}", result.end) };
+        // A key frame a second, and a mark before each.
+        assert!(told.abs_diff(at) < 100 && skipped < 600_000, "{what} at {at}: {}", result.end);
+        assert!(result.difference.is_none() && result.gaps >= 1, "{what}: {result:?}");
+        assert!(
+            result.activations + 10_000 > whole.activations && result.activations < whole.activations,
+            "{result:?}"
+        );
+    }
+    // Damage without a key frame behind it ends the replay as a cut does.
+    let last = [&log[..log.len() - 3_000], &log[log.len() - 2_990..]].concat();
+    let result = replay(&last).expect("a log that can be replayed");
+    assert!(!result.end.is_whole() && result.difference.is_none(), "{result:?}");
+    assert!(result.activations + 1_000 > whole.activations, "{result:?}");
+    // Without its topics there is nothing to repeat.
+    let head = [&log[..200], &log[203..]].concat();
+    assert!(matches!(replay(&head), Err(ReplayError::NoneLeft(End::Damaged { .. }))));
 }
 
 /// The vehicle was switched off while it wrote: every whole message is worth replaying.
