@@ -3,10 +3,10 @@
 //! A text holds every vehicle, and of it the subscribed topics that have a new sample since the last text:
 //!
 //! ```json
-//! {"state":[[0,12.34,[15,4936,12.3375,1.0,0.0,0.0,0.0]]],"dropped":0}
+//! {"now":81542.1,"state":[[0,12.34,[15,4936,12.3375,1.0,0.0,0.0,0.0]]],"dropped":0}
 //! ```
 //!
-//! Vehicle, its clock in s, then per topic its place in the card, how many samples it has had, the newest one's instant in s and
+//! The server's clock in ms, which a page counts on to say [when](crate::ask::Asked::at) it asks something. Of each vehicle its number, its clock in s, then per topic its place in the card, how many samples it has had, the newest one's instant in s and
 //! its numbers in the order of the card's fields. What is no number is `null`; truth values, names and flags are numbers.
 
 use crate::card::TopicCard;
@@ -15,6 +15,7 @@ use crate::newest::Newest;
 use stampfly_types::schema::Value;
 use std::fmt::Write;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What a page wants to be told, and what it has been told.
 #[derive(Debug)]
@@ -44,10 +45,10 @@ impl Feed {
         self.told = self.hub.samples().map(|(_, topics)| of_vehicle(topics)).collect();
     }
 
-    /// What is new.
-    pub fn text(&mut self) -> String {
+    /// What is new, at this time of the server's clock.
+    pub fn text(&mut self, now: Duration) -> String {
         let mut text = String::with_capacity(4096);
-        text.push_str("{\"state\":[");
+        put(&mut text, format_args!("{{\"now\":{:.1},\"state\":[", now.as_secs_f64() * 1e3));
         self.told.resize(self.hub.vehicles(), Vec::new());
         for (vehicle, ((newest, topics), told)) in self.hub.samples().zip(&mut self.told).enumerate() {
             if vehicle > 0 {
@@ -109,13 +110,18 @@ mod tests {
         watch.note(Id::estimate_state as usize, Instant::from_millis(1500), &StateEstimate::default().to_words());
 
         let mut feed = Feed::new(hub);
-        assert_eq!(feed.text(), r#"{"state":[[0,0.0000],[1,1.5000]],"dropped":0}"#);
+        assert_eq!(feed.text(Duration::ZERO), r#"{"now":0.0,"state":[[0,0.0000],[1,1.5000]],"dropped":0}"#);
         feed.subscribe(vec!["flight_status".into(), "nonsense".into()]);
         let place = Id::flight_status as usize;
-        let expected =
-            format!(r#"{{"state":[[0,0.0000],[1,1.5000,[{place},1,1.500000,5,1,1,0,0,0,0,0]]],"dropped":0}}"#);
-        assert_eq!(feed.text(), expected);
-        assert_eq!(feed.text(), r#"{"state":[[0,0.0000],[1,1.5000]],"dropped":0}"#, "nothing twice");
+        let expected = format!(
+            r#"{{"now":20.5,"state":[[0,0.0000],[1,1.5000,[{place},1,1.500000,5,1,1,0,0,0,0,0]]],"dropped":0}}"#
+        );
+        assert_eq!(feed.text(Duration::from_micros(20_500)), expected);
+        assert_eq!(
+            feed.text(Duration::from_millis(40)),
+            r#"{"now":40.0,"state":[[0,0.0000],[1,1.5000]],"dropped":0}"#,
+            "nothing twice"
+        );
     }
 
     #[test]
@@ -126,7 +132,7 @@ mod tests {
         watch.note(Id::estimate_state as usize, Instant::from_millis(1), &estimate.to_words());
         let mut feed = Feed::new(hub);
         feed.subscribe(vec!["estimate_state".into()]);
-        let text = feed.text();
+        let text = feed.text(Duration::ZERO);
         assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok() && text.contains("null,null"), "{text}");
     }
 }

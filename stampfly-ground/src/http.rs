@@ -14,6 +14,10 @@ use std::net::IpAddr;
 pub const LONGEST_HEAD: usize = 8192;
 /// Most header lines.
 const HEADERS: usize = 64;
+/// Between a path and the secret.
+const SECRET: &str = "?secret=";
+/// Longest secret, characters: letters and digits.
+const LONGEST_SECRET: usize = 128;
 /// What a base64 text of 16 bytes is long.
 const KEY: usize = 24;
 
@@ -22,6 +26,8 @@ const KEY: usize = 24;
 pub struct Request {
     /// What is wanted.
     pub wanted: Wanted,
+    /// The secret that it knows: what follows `?secret=` in its path.
+    pub secret: Option<String>,
     /// How many of the bytes are its head; what follows belongs to the WebSocket.
     pub length: usize,
 }
@@ -51,14 +57,18 @@ pub enum Refusal {
     Body,
     /// `Host` is missing, there twice, or names no address of this machine.
     ForeignHost,
-    /// `Origin` is another server.
+    /// `Origin` is another server, or the request is made by a page of one.
     ForeignOrigin,
+    /// The secret is missing or wrong.
+    Secret,
     /// There is nothing of this name.
     NotFound,
     /// `/ws` without a handshake of WebSocket version 13.
     NotWebSocket,
     /// Too many connections.
     Busy,
+    /// It is there, and cannot be read.
+    Unreadable,
     /// The head did not come in time.
     Slow,
 }
@@ -71,10 +81,11 @@ impl Refusal {
             Self::NotHttp | Self::Body => "400 Bad Request",
             Self::TooLong => "431 Request Header Fields Too Large",
             Self::Method => "405 Method Not Allowed",
-            Self::ForeignHost | Self::ForeignOrigin => "403 Forbidden",
+            Self::ForeignHost | Self::ForeignOrigin | Self::Secret => "403 Forbidden",
             Self::NotFound => "404 Not Found",
             Self::NotWebSocket => "426 Upgrade Required",
             Self::Busy => "503 Service Unavailable",
+            Self::Unreadable => "500 Internal Server Error",
             Self::Slow => "408 Request Timeout",
         }
     }
@@ -89,9 +100,11 @@ impl fmt::Display for Refusal {
             Self::Body => "a request with a body",
             Self::ForeignHost => "this server does not answer to that name; use localhost or an IP address",
             Self::ForeignOrigin => "a page of another server",
+            Self::Secret => "the address of this page ends with a secret, as 'stampfly' has printed it",
             Self::NotFound => "there is nothing of this name",
             Self::NotWebSocket => "here is a WebSocket, version 13",
             Self::Busy => "too many connections",
+            Self::Unreadable => "it cannot be read",
             Self::Slow => "the request did not come in time",
         })
     }
@@ -153,12 +166,26 @@ pub fn request(bytes: &[u8], hosts: Hosts) -> Result<Option<Request>, Refusal> {
     if length_of_body.is_some_and(|length| length != "0") || headers.all("Transfer-Encoding").next().is_some() {
         return Err(Refusal::Body);
     }
+    let (path, secret) = match path.split_once(SECRET) {
+        Some((path, secret)) if is_secret(secret) => (path, Some(secret.to_owned())),
+        Some(_) => return Err(Refusal::NotFound),
+        None => (path, None),
+    };
     let wanted = match path {
         "/" => Wanted::Page,
         "/ws" => Wanted::Socket(headers.socket_key().ok_or(Refusal::NotWebSocket)?.to_owned()),
         _ => path.strip_prefix("/log/").and_then(number).map(Wanted::Log).ok_or(Refusal::NotFound)?,
     };
-    Ok(Some(Request { wanted, length }))
+    // A person may come from anywhere. What only the page itself needs, no other page may have fetched, nor an image in one.
+    let site = headers.only("Sec-Fetch-Site").map_err(|_| Refusal::ForeignOrigin)?;
+    if wanted != Wanted::Page && site.is_some_and(|site| !matches!(site, "same-origin" | "none")) {
+        return Err(Refusal::ForeignOrigin);
+    }
+    Ok(Some(Request { wanted, secret, length }))
+}
+
+fn is_secret(text: &str) -> bool {
+    (1..=LONGEST_SECRET).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_alphanumeric())
 }
 
 /// Digits alone: the standard parser would take a sign.
@@ -230,7 +257,7 @@ const GUARDS: &str = "X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r
 
 /// The head of an answer with a body of this length. `extra` are header lines, each with its end.
 #[must_use]
-pub fn head(status: &str, content: &str, length: usize, extra: &str) -> String {
+pub fn head(status: &str, content: &str, length: u64, extra: &str) -> String {
     format!(
         "HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {length}\r\nConnection: close\r\n{GUARDS}{extra}\r\n"
     )
@@ -245,7 +272,7 @@ pub fn refuse(refusal: Refusal) -> String {
         _ => "",
     };
     let body = format!("{refusal}\n");
-    head(refusal.status(), "text/plain; charset=utf-8", body.len(), extra) + &body
+    head(refusal.status(), "text/plain; charset=utf-8", body.len() as u64, extra) + &body
 }
 
 /// The answer to a WebSocket's handshake, with what follows from the client's key (RFC 6455 section 4.2.2, 5.4), which libraries of
@@ -307,6 +334,34 @@ mod tests {
             ["http://evil.example", "null", "https://localhost:8000", "http://localhost:8001", "http://127.0.0.1:8000"]
         {
             assert_eq!(from(origin), Err(Refusal::ForeignOrigin), "{origin}");
+        }
+    }
+
+    #[test]
+    fn only_the_page_itself_is_shown_to_who_comes_from_another_site() {
+        for (site, path, wanted) in [
+            ("cross-site", "/", Ok(Wanted::Page)),
+            ("cross-site", "/log/0", Err(Refusal::ForeignOrigin)),
+            ("same-site", "/log/0", Err(Refusal::ForeignOrigin)),
+            ("same-origin", "/log/0", Ok(Wanted::Log(0))),
+            ("none", "/log/0", Ok(Wanted::Log(0))),
+        ] {
+            let headers = format!("Host: localhost\r\nSec-Fetch-Site: {site}\r\n");
+            assert_eq!(get(path, &headers, Hosts::Loopback), wanted, "{site} {path}");
+        }
+    }
+
+    #[test]
+    fn a_secret_follows_the_path() {
+        let secret = |path: &str| {
+            let text = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+            request(text.as_bytes(), Hosts::Loopback).map(|granted| granted.expect("a whole request").secret)
+        };
+        assert_eq!(secret("/log/0"), Ok(None));
+        assert_eq!(secret("/log/0?secret=aB3"), Ok(Some("aB3".to_owned())));
+        let long = format!("/?secret={}", "a".repeat(LONGEST_SECRET + 1));
+        for path in ["/log/0?secret=", "/?secret=a&b", "/?secret=a/..", "/?secret=%61", &long] {
+            assert_eq!(secret(path), Err(Refusal::NotFound), "{path}");
         }
     }
 

@@ -20,7 +20,7 @@ mod newest;
 
 pub use card::{Calibration, ParameterCard, TopicCard, VehicleCard};
 pub use feed::Feed;
-pub use hub::{Client, Connection, Event, Hub, NotAsked};
+pub use hub::{Client, Connection, Event, FRESH, Hub, LogSoFar, NotAsked};
 pub use newest::Watch;
 /// What can be asked.
 pub use stampfly_sim::ask;

@@ -1,8 +1,9 @@
 //! A log on the disk that grows while others read it.
 
+use stampfly_ground::LogSoFar;
 use stampfly_log::ulog::Sink;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -37,12 +38,16 @@ impl LogFile {
         self.lock().flush()
     }
 
-    /// All of it so far; empty when it cannot be read.
-    #[must_use]
-    pub fn so_far(&self) -> Vec<u8> {
+    /// All of it so far.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn so_far(&self) -> io::Result<LogSoFar> {
         // What is still in memory goes to the disk first.
-        _ = self.flush();
-        std::fs::read(&self.path).unwrap_or_default()
+        self.flush()?;
+        let file = File::open(&self.path)?;
+        let length = file.metadata()?.len();
+        Ok(LogSoFar { length, bytes: Box::new(file.take(length)) })
     }
 
     fn lock(&self) -> MutexGuard<'_, BufWriter<File>> {

@@ -7,7 +7,7 @@ use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::Key;
 use stampfly_services::mavlink::Identity;
 use stampfly_services::network::{Client, Ends, Heard, Ports};
-use stampfly_services::{Cockpit, Places, Refusal, Samples, Seat, View};
+use stampfly_services::{Cockpit, Connection, Places, Refusal, Samples, Seat, View};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 use std::cell::RefCell;
@@ -34,6 +34,7 @@ struct Vehicle {
     gain: f32,
     places: Places,
     commands: usize,
+    connections: Connection,
 }
 
 struct Nothing;
@@ -79,6 +80,13 @@ impl Cockpit for Vehicle {
         self.commands += 1;
         Ok(())
     }
+
+    fn connection(&mut self) -> Connection {
+        self.connections += 1;
+        self.connections
+    }
+
+    fn leave(&mut self, _: &dyn Fn(Seat) -> bool) {}
 
     fn steer(&mut self, _: Instant, _: Seat, _: &PilotInput) -> Result<(), Refusal> {
         Ok(())
@@ -189,7 +197,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         reach: 0.25,
         version: [1, 0, 0],
     };
-    let mut ports = Ports::<16>::new(identity, &Key::generate(1, KEY)?, EPOCH);
+    let key = Key::generate(1, KEY)?;
+    println!("phrase {}", key.phrase());
+    let mut ports = Ports::<16>::new(identity, &key, EPOCH);
     let (mut sockets, mut vehicle) = (Sockets::open()?, Vehicle { gain: 0.25, ..Vehicle::default() });
     let start = std::time::Instant::now();
     while start.elapsed() < Duration::from_secs(seconds) {

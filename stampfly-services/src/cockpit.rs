@@ -4,8 +4,9 @@
 //! publishers of its commands, its parameters. Whether a command is obeyed is the mode machine's decision, and seen in the
 //! [`view`](Cockpit::view); a [`Refusal`] says that it did not even get there.
 
+use crate::helm::Told;
 use crate::lease::is_sane;
-use crate::refusal::{Refusal, Seat};
+use crate::refusal::{Connection, Refusal, Seat};
 use crate::view::View;
 use stampfly_flight::parameters::Parameters;
 use stampfly_types::Instant;
@@ -39,10 +40,27 @@ pub enum Request {
     AcceptCalibration(CalibrationReport),
 }
 
+/// The two commands that go to a place at once: the first forgets the route.
+pub(crate) fn fly_to(way_point: GuidedCommand) -> [GuidedCommand; 2] {
+    let hold = GuidedCommand { kind: GuidedKind::Hold, ..Default::default() };
+    [hold, GuidedCommand { kind: GuidedKind::WayPoint, ..way_point }]
+}
+
 /// A vehicle, as services see it.
 pub trait Cockpit {
     /// What it has published.
     fn view(&self) -> View<'_>;
+
+    /// A number for a connection that has come. No other that is there has it.
+    fn connection(&mut self) -> Connection;
+
+    /// A connection has ended, or a page is gone: these do not sit there any more.
+    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool);
+
+    /// What was asked of the vehicle after this number, and by whom: to be told to everybody. Begin with 0.
+    fn told(&self, _after: u32) -> Option<(u32, Told)> {
+        None
+    }
 
     /// Asks for something.
     ///
@@ -59,17 +77,18 @@ pub trait Cockpit {
         if !is_sane(&way_point) {
             return Err(Refusal::Range);
         }
-        self.guide(now, seat, GuidedCommand { kind: GuidedKind::Hold, ..Default::default() })?;
-        self.guide(now, seat, GuidedCommand { kind: GuidedKind::WayPoint, ..way_point })
+        let [hold, way_point] = fly_to(way_point);
+        self.guide(now, seat, hold)?;
+        self.guide(now, seat, way_point)
     }
 
     /// Hands over a frame of sticks and switches, as a transmitter would.
     ///
     /// # Errors
-    /// When another transmitter is heard.
+    /// When another program commands.
     fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal>;
 
-    /// A sign of life of whoever sits there: what keeps the vehicle from taking its link for lost.
+    /// A sign of life of who sits there: what keeps the vehicle from taking its link for lost.
     fn alive(&mut self, now: Instant, seat: Seat);
 
     /// Its parameters.

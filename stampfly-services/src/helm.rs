@@ -1,18 +1,21 @@
-//! The part of a [`Cockpit`] that is the same for every vehicle: who commands, and who has the sticks.
+//! The part of a [`Cockpit`] that is the same for every vehicle: who commands, and what everybody is told of it.
 //!
 //! A vehicle implements [`Hands`]: how its commands and sticks are published, where its parameters are, what its board does. [`Seated`] is its cockpit for one
 //! call of a service, in firmware and in simulation alike.
 
-use crate::cockpit::{Cockpit, Request};
+use crate::cockpit::{Cockpit, Request, fly_to};
 use crate::lease::Lease;
-use crate::refusal::{Refusal, Seat};
+use crate::refusal::{Connection, Refusal, Seat};
 use crate::view::View;
+use core::fmt;
 use stampfly_flight::parameters::Parameters;
-use stampfly_types::messages::{CalibrationKind, GuidedCommand, PilotInput};
+use stampfly_types::messages::{CalibrationKind, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant, Origin};
 
-/// A transmitter that was not heard for this long is off; then somebody else may take the sticks.
-const TRANSMITTER: Duration = Duration::from_millis(500);
+/// The same command of the same program is told once in this time: some say it ten times a second.
+const AGAIN: Duration = Duration::from_secs(1);
+/// What was asked and not told yet: as much as comes between two turns of a service.
+const TELLS: usize = 8;
 
 /// What a vehicle does for its services.
 pub trait Hands {
@@ -46,22 +49,79 @@ pub trait Hands {
     fn poll(&mut self, _now: Instant, _armed: bool) {}
 }
 
-/// Who commands, and who has the sticks.
+/// What was asked of the vehicle, and by whom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Told {
+    /// Who.
+    pub seat: Seat,
+    /// What.
+    pub what: Asked,
+}
+
+/// What was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// A command.
+    Command(GuidedKind),
+    /// To fly by its sticks.
+    Sticks,
+    /// Nothing more: it is gone, and had the lease.
+    Left,
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { seat, what } = self;
+        match what {
+            Asked::Command(kind) => write!(f, "{seat}: {}", word(*kind)),
+            Asked::Sticks => write!(f, "{seat}: flies by hand"),
+            Asked::Left => write!(f, "{seat} is gone, none commands"),
+        }
+    }
+}
+
+const fn word(kind: GuidedKind) -> &'static str {
+    match kind {
+        GuidedKind::None => "is there",
+        GuidedKind::Arm => "arm",
+        GuidedKind::Disarm => "disarm",
+        GuidedKind::TakeOff => "take off",
+        GuidedKind::WayPoint => "go there",
+        GuidedKind::Hold => "hold",
+        GuidedKind::Land => "land",
+        GuidedKind::Kill => "KILL",
+        GuidedKind::FlipLeft | GuidedKind::FlipRight | GuidedKind::FlipForward | GuidedKind::FlipBack => "flip",
+        GuidedKind::AutotuneRoll | GuidedKind::AutotunePitch | GuidedKind::AutotuneYaw => "autotune",
+    }
+}
+
+/// Who commands, and what everybody is told of it.
 #[derive(Clone, Debug, Default)]
 pub struct Helm {
     lease: Lease,
-    /// Who has the sticks, and when they were last heard.
-    sticks: Option<(Seat, Instant)>,
+    /// Connections that have come.
+    connections: Connection,
+    tells: [Option<Told>; TELLS],
+    /// How many there have been.
+    told: u32,
+    /// When the newest one was asked last.
+    asked: Instant,
 }
 
 impl Helm {
-    /// Nobody.
+    /// No program commands.
     #[must_use]
     pub const fn new() -> Self {
-        Self { lease: Lease::new(), sticks: None }
+        Self { lease: Lease::new(), connections: 0, tells: [None; TELLS], told: 0, asked: Instant::ZERO }
     }
 
-    /// What is to be done now and then, whoever is connected: call it at least every 100 ms.
+    /// Who commands.
+    #[must_use]
+    pub fn holder(&self, now: Instant) -> Option<Seat> {
+        self.lease.holder(now)
+    }
+
+    /// What is to be done now and then, whichever programs are connected: call it at least every 100 ms.
     pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {
         if !armed {
             self.lease.release();
@@ -71,6 +131,29 @@ impl Helm {
             _ = hands.command(now, GuidedCommand::default());
         }
         hands.poll(now, armed);
+    }
+
+    fn tell(&mut self, now: Instant, told: Told) {
+        let newest = self.tells.get((self.told as usize).wrapping_sub(1) % TELLS).copied().flatten();
+        let is_new = newest != Some(told) || now.since(self.asked) >= AGAIN;
+        self.asked = now;
+        if is_new {
+            if let Some(place) = self.tells.get_mut(self.told as usize % TELLS) {
+                *place = Some(told);
+            }
+            self.told = self.told.wrapping_add(1);
+        }
+    }
+
+    /// What comes after this number. What a service has not looked at for too long is gone.
+    fn told(&self, after: u32) -> Option<(u32, Told)> {
+        let waiting = self.told.wrapping_sub(after);
+        if waiting == 0 {
+            return None;
+        }
+        let place = if waiting as usize > TELLS { self.told.wrapping_sub(TELLS as u32) } else { after };
+        let told = self.tells.get(place as usize % TELLS).copied().flatten()?;
+        Some((place.wrapping_add(1), told))
     }
 }
 
@@ -89,21 +172,51 @@ impl Cockpit for Seated<'_> {
         self.view
     }
 
+    fn connection(&mut self) -> Connection {
+        self.helm.connections = self.helm.connections.wrapping_add(1);
+        self.helm.connections
+    }
+
+    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
+        let holder = self.helm.lease.commander();
+        self.helm.lease.leave(has_left);
+        if let Some(seat) = holder.filter(|_| self.helm.lease.commander().is_none()) {
+            let at = self.helm.asked;
+            self.helm.tell(at, Told { seat, what: Asked::Left });
+        }
+    }
+
+    fn told(&self, after: u32) -> Option<(u32, Told)> {
+        self.helm.told(after)
+    }
+
     fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal> {
         self.helm.lease.ask(now, seat, &command)?;
-        self.hands.command(now, command)
+        self.hands.command(now, command)?;
+        if command.kind != GuidedKind::None {
+            self.helm.tell(now, Told { seat, what: Asked::Command(command.kind) });
+        }
+        Ok(())
+    }
+
+    fn fly_to(&mut self, now: Instant, seat: Seat, way_point: GuidedCommand) -> Result<(), Refusal> {
+        let [hold, way_point] = fly_to(way_point);
+        self.helm.lease.ask(now, seat, &way_point)?;
+        self.hands.command(now, hold)?;
+        self.guide(now, seat, way_point)
     }
 
     fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
-        let other = self.helm.sticks.filter(|(other, at)| *other != seat && now.since(*at) < TRANSMITTER);
         // A kill is everybody's.
-        if other.is_some() && !input.kill {
-            return Err(Refusal::PilotFlies);
+        if !input.kill {
+            self.helm.lease.steer(now, seat)?;
         }
-        if other.is_none() {
-            self.helm.sticks = Some((seat, now));
+        self.hands.sticks(now, &input.cleaned())?;
+        if self.view.state().armed {
+            let what = if input.kill { Asked::Command(GuidedKind::Kill) } else { Asked::Sticks };
+            self.helm.tell(now, Told { seat, what });
         }
-        self.hands.sticks(now, &input.cleaned())
+        Ok(())
     }
 
     fn alive(&mut self, now: Instant, seat: Seat) {

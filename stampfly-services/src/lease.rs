@@ -2,8 +2,9 @@
 //!
 //! Several may be connected: a ground station that watches, a script that flies. The first that asks for anything has the lease
 //! as long as it is heard; the others are told who has it. A kill is everybody's at any time, and so is landing. When the holder falls
-//! silent, the lease is over: the vehicle's own failsafe does the rest, and another program may take it up again.
-//! What a pilot's sticks do to a program's commands is the mode machine's business (`stampfly-mode`): they win.
+//! silent or its connection ends, the vehicle's own failsafe acts, and another program may take the lease with a command. Sticks of a program obey the
+//! same rule, but do not take the lease of a flight: some are sent as long as a page is open. A transmitter's sticks do not come
+//! here: what they do is the mode machine's decision (`stampfly-mode`), and they win.
 
 use crate::refusal::{Refusal, Seat};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
@@ -31,16 +32,19 @@ pub(crate) fn is_sane(command: &GuidedCommand) -> bool {
 /// use stampfly_types::{Instant, messages::{GuidedCommand, GuidedKind}};
 /// let command = |kind| GuidedCommand { kind, ..Default::default() };
 /// let mut lease = Lease::new();
-/// assert_eq!(lease.ask(Instant::ZERO, Seat::Tello, &command(GuidedKind::Arm)), Ok(()));
-/// let refused = lease.ask(Instant::ZERO, Seat::Page, &command(GuidedKind::WayPoint));
-/// assert_eq!(refused, Err(Refusal::Occupied(Seat::Tello)));
-/// assert_eq!(lease.ask(Instant::ZERO, Seat::Page, &command(GuidedKind::Kill)), Ok(()));
-/// // Silent for three seconds: somebody else's turn.
-/// assert_eq!(lease.ask(Instant::from_secs(3), Seat::Page, &command(GuidedKind::WayPoint)), Ok(()));
+/// let (one, two) = (Seat::Page(1), Seat::Page(2));
+/// assert_eq!(lease.ask(Instant::ZERO, one, &command(GuidedKind::Arm)), Ok(()));
+/// let refused = lease.ask(Instant::ZERO, two, &command(GuidedKind::WayPoint));
+/// assert_eq!(refused, Err(Refusal::Occupied(one)));
+/// assert_eq!(lease.ask(Instant::ZERO, two, &command(GuidedKind::Kill)), Ok(()));
+/// // Silent for three seconds: another's turn.
+/// assert_eq!(lease.ask(Instant::from_secs(3), two, &command(GuidedKind::WayPoint)), Ok(()));
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lease {
     holder: Option<Seat>,
+    /// Its connection has ended.
+    has_left: bool,
     /// Of the holder; without one, of anybody.
     heard: Option<Instant>,
     /// When a sign of life was passed on.
@@ -51,16 +55,28 @@ impl Lease {
     /// Nobody commands.
     #[must_use]
     pub const fn new() -> Self {
-        Self { holder: None, heard: None, passed: None }
+        Self { holder: None, has_left: false, heard: None, passed: None }
     }
 
     /// Who commands.
     #[must_use]
     pub fn holder(&self, now: Instant) -> Option<Seat> {
-        self.holder.filter(|_| self.is_heard(now))
+        self.holder.filter(|_| !self.has_left && self.is_heard(now))
     }
 
-    /// May this be passed on to the vehicle? Whoever asks for more than a kill has the lease then.
+    /// Who has taken the lease of this flight and has not left, heard or not.
+    #[must_use]
+    pub fn commander(&self) -> Option<Seat> {
+        self.holder.filter(|_| !self.has_left)
+    }
+
+    /// Do this one's signs of life count?
+    #[must_use]
+    pub fn is_holders(&self, seat: Seat) -> bool {
+        self.holder.is_none_or(|holder| holder == seat)
+    }
+
+    /// May this be passed on to the vehicle? A program that asks for more than a kill has the lease then.
     ///
     /// # Errors
     /// When another program has it, or a number is none.
@@ -72,27 +88,47 @@ impl Lease {
             return Err(Refusal::Range);
         }
         match self.holder(now).filter(|holder| *holder != seat) {
-            // Whoever has it goes on commanding, to a vehicle that lands.
+            // The holder goes on commanding, to a vehicle that lands.
             Some(_) if matches!(command.kind, GuidedKind::Land | GuidedKind::Disarm) => Ok(()),
             Some(holder) => Err(Refusal::Occupied(holder)),
             None => {
-                (self.holder, self.heard) = (Some(seat), Some(now));
+                (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
                 Ok(())
             }
         }
     }
 
-    /// Somebody is there. While a vehicle is commanded, only its commander's signs of life count, also after a silence: the
-    /// vehicle's failsafe has to notice that nobody does, however many watch. Of one that nobody commands, anybody's count.
-    pub fn alive(&mut self, now: Instant, seat: Seat) {
-        if self.holder.is_none_or(|holder| holder == seat) {
-            self.heard = Some(now);
+    /// May these sticks be passed on? The holder's are a sign of life.
+    ///
+    /// # Errors
+    /// When another program has the lease, or had it last in this flight.
+    pub fn steer(&mut self, now: Instant, seat: Seat) -> Result<(), Refusal> {
+        match self.holder {
+            Some(holder) if holder != seat => Err(Refusal::Occupied(holder)),
+            _ => {
+                (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
+                Ok(())
+            }
         }
     }
 
-    /// The vehicle stands with its motors off: nobody has anything to hold.
+    /// Its connection has ended. Another may take the lease at once; until one does, the vehicle's failsafe hears nothing.
+    pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
+        self.has_left |= self.holder.is_some_and(has_left);
+    }
+
+    /// A program is there. While a vehicle is commanded, only its commander's signs of life count, also after a silence: the
+    /// vehicle's failsafe has to notice that the commander is gone, however many watch. Before there is one, every program's count.
+    pub fn alive(&mut self, now: Instant, seat: Seat) {
+        if self.is_holders(seat) {
+            // A page whose connection broke has come again.
+            (self.heard, self.has_left) = (Some(now), false);
+        }
+    }
+
+    /// The vehicle stands with its motors off: there is nothing to hold.
     pub fn release(&mut self) {
-        self.holder = None;
+        (self.holder, self.has_left) = (None, false);
     }
 
     /// Is a sign of life to be passed on to the vehicle now? Ask at least every [`LIFE`].
@@ -114,35 +150,66 @@ mod tests {
     use super::*;
     use stampfly_types::Vec3;
 
+    const ONE: Seat = Seat::Mavlink { connection: 1, system: 255, component: 190 };
+    /// Of the same numbers, at another connection.
+    const TWO: Seat = Seat::Mavlink { connection: 2, system: 255, component: 190 };
+
     fn command(kind: GuidedKind) -> GuidedCommand {
         GuidedCommand { kind, ..Default::default() }
     }
 
     #[test]
     fn a_watcher_does_not_keep_the_lease_of_a_silent_commander() {
-        let mut lease = Lease::new();
-        assert_eq!(lease.ask(Instant::ZERO, Seat::Tello, &command(GuidedKind::TakeOff)), Ok(()));
-        for ms in (0..3_000).step_by(500) {
-            let now = Instant::from_millis(ms);
-            lease.alive(now, Seat::Mavlink(255));
-            assert_eq!(lease.holder(now), Some(Seat::Tello));
+        for watcher in [TWO, Seat::Mavlink { connection: 1, system: 255, component: 191 }, Seat::Page(1), Seat::Link] {
+            let mut lease = Lease::new();
+            assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
+            for ms in (0..3_000).step_by(500) {
+                let now = Instant::from_millis(ms);
+                lease.alive(now, watcher);
+                assert_eq!(lease.steer(now, watcher), Err(Refusal::Occupied(ONE)));
+                assert_eq!(lease.holder(now), Some(ONE));
+            }
+            for ms in (3_000..10_000).step_by(500) {
+                let now = Instant::from_millis(ms);
+                lease.alive(now, watcher);
+                assert_eq!(lease.steer(now, watcher), Err(Refusal::Occupied(ONE)), "its sticks may lie on a table");
+                assert_eq!(lease.holder(now), None);
+                assert!(!lease.is_sign_due(now), "the link is lost although another watches");
+            }
+            let now = Instant::from_secs(10);
+            assert_eq!(lease.ask(now, watcher, &command(GuidedKind::Hold)), Ok(()), "who watched may take over");
+            assert_eq!(lease.steer(now, watcher), Ok(()));
+            assert!(lease.is_sign_due(now));
         }
-        for ms in (3_000..10_000).step_by(500) {
-            let now = Instant::from_millis(ms);
-            lease.alive(now, Seat::Mavlink(255));
-            assert_eq!(lease.holder(now), None);
-            assert!(!lease.is_sign_due(now), "the link is lost although somebody watches");
-        }
-        let now = Instant::from_secs(10);
-        assert_eq!(lease.ask(now, Seat::Mavlink(255), &command(GuidedKind::Hold)), Ok(()), "who watched may take over");
-        assert!(lease.is_sign_due(now));
     }
 
     #[test]
-    fn signs_of_life_are_passed_on_ten_times_a_second_while_somebody_is_there() {
+    fn a_commander_whose_connection_ends_makes_room_and_is_not_heard_any_more() {
         let mut lease = Lease::new();
-        assert!(!lease.is_sign_due(Instant::ZERO), "nobody was ever heard");
-        lease.alive(Instant::ZERO, Seat::Page);
+        assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
+        lease.leave(|seat| seat.is_at(2));
+        assert_eq!(lease.holder(Instant::ZERO), Some(ONE), "another has left");
+        lease.leave(|seat| seat.is_at(1));
+        for ms in (100..10_000).step_by(100) {
+            let now = Instant::from_millis(ms);
+            lease.alive(now, TWO);
+            assert!(ms < 3_000 || !lease.is_sign_due(now), "{ms} ms");
+        }
+        let now = Instant::from_millis(10_000);
+        assert_eq!(lease.ask(now, TWO, &command(GuidedKind::Hold)), Ok(()));
+        assert_eq!(lease.holder(now), Some(TWO));
+
+        let mut lease = Lease::new();
+        assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
+        lease.leave(|seat| seat.is_at(1));
+        assert_eq!(lease.ask(Instant::ZERO, TWO, &command(GuidedKind::Hold)), Ok(()), "at once");
+    }
+
+    #[test]
+    fn signs_of_life_are_passed_on_ten_times_a_second_while_a_program_is_there() {
+        let mut lease = Lease::new();
+        assert!(!lease.is_sign_due(Instant::ZERO), "none was ever heard");
+        lease.alive(Instant::ZERO, ONE);
         let due = (0..4_000).step_by(20).filter(|ms| lease.is_sign_due(Instant::from_millis(*ms))).count();
         assert_eq!(due, 30, "three seconds");
     }
@@ -152,26 +219,24 @@ mod tests {
         let mut lease = Lease::new();
         for wrong in [f32::NAN, f32::INFINITY, 1_001.0] {
             let position = Vec3::new(0.0, wrong, 0.0);
-            let asked =
-                lease.ask(Instant::ZERO, Seat::Page, &GuidedCommand { position, ..command(GuidedKind::WayPoint) });
+            let asked = lease.ask(Instant::ZERO, ONE, &GuidedCommand { position, ..command(GuidedKind::WayPoint) });
             assert_eq!(asked, Err(Refusal::Range));
-            let asked =
-                lease.ask(Instant::ZERO, Seat::Page, &GuidedCommand { speed: wrong, ..command(GuidedKind::Hold) });
+            let asked = lease.ask(Instant::ZERO, ONE, &GuidedCommand { speed: wrong, ..command(GuidedKind::Hold) });
             assert_eq!(asked, Err(Refusal::Range));
         }
         assert_eq!(lease, Lease::new());
         let kill = GuidedCommand { yaw: f32::NAN, ..command(GuidedKind::Kill) };
-        assert_eq!(lease.ask(Instant::ZERO, Seat::Page, &kill), Ok(()), "whatever else it says");
+        assert_eq!(lease.ask(Instant::ZERO, ONE, &kill), Ok(()), "whatever else it says");
     }
 
     #[test]
-    fn anybody_may_land_and_the_holder_stays() {
+    fn every_program_may_land_and_the_holder_stays() {
         let mut lease = Lease::new();
-        assert_eq!(lease.ask(Instant::ZERO, Seat::Page, &command(GuidedKind::TakeOff)), Ok(()));
+        assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
         for kind in [GuidedKind::Land, GuidedKind::Disarm, GuidedKind::Kill] {
             assert_eq!(lease.ask(Instant::ZERO, Seat::Console, &command(kind)), Ok(()));
         }
-        assert_eq!(lease.holder(Instant::ZERO), Some(Seat::Page));
+        assert_eq!(lease.holder(Instant::ZERO), Some(ONE));
         lease.release();
         assert_eq!(lease.holder(Instant::ZERO), None);
     }

@@ -2,30 +2,51 @@
 
 use core::fmt;
 
-/// Who asks.
+/// Number of a connection: a stream, an address of datagrams, a cable. Two that are there at the same time have different ones.
+pub type Connection = u32;
+
+/// Who asks: not which kind of program, and not what number it gives itself, but which connection it has. Another that calls itself the same is
+/// another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Seat {
-    /// The page of the ground station.
-    Page,
-    /// A program that speaks MAVLink, by its system.
-    Mavlink(u8),
+    /// A page of the ground station, by its number.
+    Page(u32),
+    /// A program that speaks MAVLink. Routers put several on one connection; they have other systems or components.
+    Mavlink {
+        /// Its connection.
+        connection: Connection,
+        /// Its system.
+        system: u8,
+        /// Its component.
+        component: u8,
+    },
     /// A program that speaks the Tello's text commands.
-    Tello,
+    Tello(Connection),
     /// A person at the console.
     Console,
-    /// A program on a secured link.
+    /// A station on a secured link.
     Link,
+}
+
+impl Seat {
+    /// Is it at this connection of MAVLink?
+    #[must_use]
+    pub const fn is_at(&self, at: Connection) -> bool {
+        matches!(self, Self::Mavlink { connection, .. } if *connection == at)
+    }
 }
 
 impl fmt::Display for Seat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Page => f.write_str("the ground station's page"),
-            Self::Mavlink(system) => write!(f, "MAVLink system {system}"),
-            Self::Tello => f.write_str("a Tello program"),
+            Self::Page(number) => write!(f, "page {number}"),
+            Self::Mavlink { connection, system, component } => {
+                write!(f, "MAVLink {system}/{component}, line {connection}")
+            }
+            Self::Tello(connection) => write!(f, "a Tello program, line {connection}"),
             Self::Console => f.write_str("the console"),
-            Self::Link => f.write_str("a program on the radio"),
+            Self::Link => f.write_str("the station with the key"),
         }
     }
 }

@@ -87,13 +87,16 @@ use crate::ask::{Ask, Asked, Guided, Reply};
 use crate::fault::{Fault, FaultKind, Injector, When};
 use crate::vehicle::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed};
 use core::cell::RefCell;
+use core::net::IpAddr;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::parameters;
+use stampfly_services::deed::{Deed, Waited};
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::link::mavlink::signing::SigningKey;
 use stampfly_services::mavlink::{Identity, Mavlink};
 use stampfly_services::msp::{Card, Msp};
 use stampfly_services::{Cockpit as _, Hands, Helm, Places, Refusal, Request, Samples, Seat, Seated, View};
+use stampfly_types::messages::{FlightStatus, GuidedCommand};
 use stampfly_types::{Duration, Instant};
 use std::sync::Arc;
 
@@ -101,6 +104,9 @@ use std::sync::Arc;
 pub const PERIOD: Duration = Duration::from_millis(5);
 /// Ticks between two turns of the services that send by themselves: 20 ms.
 pub const TURN: u32 = 4;
+
+/// Asks of pages that wait to be seen done. More are answered at once.
+const WAITS: usize = 64;
 
 /// What a vehicle is for programs at its ports.
 #[derive(Clone, Copy, Debug)]
@@ -135,6 +141,10 @@ pub struct Ground<H> {
     ports: Arc<dyn Ports>,
     speed: Option<Speed>,
     faults: Injector,
+    /// What was asked of the vehicle, and told to pages.
+    told: u32,
+    /// What pages have asked, and is not seen yet.
+    waits: Vec<(Client, Asked, Waited)>,
     /// What the vehicle does for them.
     pub hands: H,
 }
@@ -157,7 +167,9 @@ impl<H: Hands> Ground<H> {
             about: *about,
             identity,
             mavlink: match live.ports.signing() {
-                Some(signing) => Mavlink::new(identity).with_key(SigningKey::new(signing.key), signing.time),
+                Some(signing) => {
+                    Mavlink::new(identity).with_key(SigningKey::from_passphrase(&signing.phrase), signing.time)
+                }
                 None => Mavlink::new(identity),
             },
             msp: Vec::new(),
@@ -166,6 +178,8 @@ impl<H: Hands> Ground<H> {
             ports: live.ports.clone(),
             speed: live.speed.clone(),
             faults: faults.clone(),
+            told: 0,
+            waits: Vec::new(),
             hands,
         }
     }
@@ -197,11 +211,25 @@ impl<H: Hands> Ground<H> {
             (PortSpec::PAGE, Heard::Bytes(text)) => {
                 let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
                 let Some(asked) = asked else { return };
-                let answer = self.page(now, &asked.ask, samples, console);
-                // What is said again and again needs no answer.
-                if !matches!(asked.ask, Ask::Sticks(_) | Ask::Alive {}) {
-                    put(&from, asked.answered(answer).as_bytes());
+                let answer = self.page(now, page(&from), &asked.ask, samples, console);
+                let waited = match &asked.ask {
+                    Ask::Guided(guided) if answer.is_ok() => Deed::of(GuidedCommand::from(*guided).kind),
+                    _ => None,
+                };
+                match waited {
+                    // Answered when it is seen to have happened.
+                    Some(deed) if self.waits.len() < WAITS => {
+                        let waited = Waited::new(now, deed, &self.seated(samples));
+                        self.waits.push((from, asked, waited));
+                    }
+                    // What is said again and again needs no answer.
+                    _ if asked.ask.is_repeated() => {}
+                    _ => put(&from, asked.answered(answer).as_bytes()),
                 }
+            }
+            (PortSpec::PAGE, Heard::Closed) => {
+                let gone = page(&from);
+                self.seated(samples).leave(&|seat| seat == gone);
             }
             (PortSpec::MAVLINK_UDP | PortSpec::MAVLINK_TCP, heard) => self.mavlink(now, from, heard, samples, put),
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Opened) => {
@@ -226,13 +254,15 @@ impl<H: Hands> Ground<H> {
             Heard::Opened if is_local => mavlink.open_local(now, from, true),
             Heard::Opened => mavlink.open(now, from, true),
             Heard::Bytes(bytes) => {
-                if is_local {
-                    mavlink.open_local(now, from, false);
-                }
                 let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
-                mavlink.hear(now, from, bytes, &mut cockpit, put);
+                match is_local {
+                    true => mavlink.hear_local(now, from, bytes, &mut cockpit, put),
+                    false => mavlink.hear(now, from, bytes, &mut cockpit, put),
+                }
             }
-            Heard::Closed => mavlink.close(from),
+            Heard::Closed => {
+                mavlink.close(from, &mut Seated { helm, hands, view: View::new(samples, places) });
+            }
         }
     }
 
@@ -240,21 +270,23 @@ impl<H: Hands> Ground<H> {
     fn page(
         &mut self,
         now: Instant,
+        seat: Seat,
         ask: &Ask,
         samples: &dyn Samples,
         console: Console<'_, H>,
     ) -> Result<Reply, String> {
         let mut cockpit = self.seated(samples);
-        cockpit.alive(now, Seat::Page);
+        cockpit.alive(now, seat);
         let said = |result: Result<(), Refusal>| match result {
             Ok(()) => Ok(Reply::text("")),
             Err(refusal) => Err(refusal.to_string()),
         };
         match ask {
             // A click on the map says where to be, not where to be after everything else.
-            Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, Seat::Page, (*go_to).into())),
-            Ask::Guided(guided) => said(cockpit.guide(now, Seat::Page, (*guided).into())),
-            Ask::Sticks(sticks) => said(cockpit.steer(now, Seat::Page, &(*sticks).into())),
+            Ask::Guided(guided) if let Some(why) = refusal(*guided, &cockpit.view().state()) => Err(why),
+            Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, seat, (*go_to).into())),
+            Ask::Guided(guided) => said(cockpit.guide(now, seat, (*guided).into())),
+            Ask::Sticks(sticks) => said(cockpit.steer(now, seat, &(*sticks).into())),
             Ask::MotorTest { motor, duty } => {
                 said(cockpit.request(now, Request::TestMotor { motor: *motor, duty: *duty }))
             }
@@ -312,9 +344,38 @@ impl<H: Hands> Ground<H> {
 
     /// Sends what is due. Call it at every turn.
     pub fn answer(&mut self, now: Instant, samples: &dyn Samples, put: Put<'_>) {
-        let Self { helm, places, hands, mavlink, .. } = self;
-        mavlink.poll(now, &mut Seated { helm, hands, view: View::new(samples, places) }, put);
+        let Self { helm, places, hands, mavlink, ports, told, waits, .. } = self;
+        let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+        waits.retain(|(client, asked, waited)| match waited.look(now, &cockpit) {
+            None => true,
+            Some(result) => {
+                let answer = result.map(|()| Reply::text("done")).map_err(|why| format!("refused: {why}"));
+                put(client, asked.answered(answer).as_bytes());
+                false
+            }
+        });
+        while let Some((number, what)) = cockpit.told(*told) {
+            *told = number;
+            ports.tell(&what.to_string());
+        }
+        mavlink.poll(now, &mut cockpit, put);
     }
+}
+
+/// Why a vehicle in this state does not do it, as far as that is known before it is asked.
+fn refusal(guided: Guided, status: &FlightStatus) -> Option<String> {
+    let mut words = String::new();
+    let deed = Deed::of(GuidedCommand::from(guided).kind)?;
+    deed.refuse(status, &mut words).then_some(words)
+}
+
+/// The page of this number.
+fn page(client: &Client) -> Seat {
+    let number = match client.address.ip() {
+        IpAddr::V6(number) => number.to_bits() as u32,
+        IpAddr::V4(number) => number.to_bits(),
+    };
+    Seat::Page(number)
 }
 
 /// All that a vehicle has at its ports, when it has nothing else there: hand it to [`Live::serve`] with [`PERIOD`].

@@ -11,6 +11,10 @@ use stampfly_sim::recorder::Recorder;
 use stampfly_sim::vehicle::{Options, Vehicle, Verdict};
 use stampfly_types::Instant;
 use std::sync::Arc;
+use std::time::Duration;
+
+/// The server's clock. Page and vehicle are in one place here: nothing is held up between them.
+const NOW: Duration = Duration::ZERO;
 
 /// Flights, and what the page is told of them.
 pub struct Demo {
@@ -50,7 +54,7 @@ impl Demo {
             .enumerate()
             .filter_map(|(number, setup)| Some(Flight::new(setup, number, hub.witness(number)?)))
             .collect();
-        let texts = vec![hub.hello()];
+        let texts = vec![hub.hello(page.client(), "", NOW)];
         let changed = parameters.into_iter().next().unwrap_or_default();
         Self { seed, hub, page, feed, flights, asked: Vec::new(), again: again.into(), changed, texts }
     }
@@ -67,9 +71,14 @@ impl Demo {
                 self.hub.answer_to(self.page.client(), None, id, Ok(Reply::default()));
             }
             Ok(Incoming::Ask(asked)) => {
-                if let Err(why) = self.hub.ask(self.page.client(), asked.clone()) {
+                let asked = Asked { at: None, ..asked };
+                if let Err(why) = self.hub.ask(self.page.client(), asked.clone(), NOW) {
                     self.hub.answer(self.page.client(), &asked, Err(why.to_string()));
                 }
+            }
+            // There is one page, and its connection does not break.
+            Ok(Incoming::Resume { id, .. }) => {
+                self.hub.answer_to(self.page.client(), None, id, Err("no such session".into()));
             }
             Err((id, error)) => self.hub.answer_to(self.page.client(), None, id, Err(error.to_string())),
         }
@@ -94,7 +103,7 @@ impl Demo {
     /// Flies for so long, in the vehicle's time.
     pub fn go_on(&mut self, microseconds: u64) {
         let until = Instant::from_micros(self.now().as_micros() + microseconds);
-        for (client, asked) in self.hub.asks(0).into_iter().chain(self.hub.asks(1)) {
+        for (client, asked) in self.hub.asks(0, NOW).into_iter().chain(self.hub.asks(1, NOW)) {
             let text = serde_json::to_vec(&asked).unwrap_or_default();
             if asked.vehicle == 0 {
                 self.asked.push((self.now(), text.clone()));
@@ -131,7 +140,7 @@ impl Demo {
     pub fn say(&mut self) -> String {
         let mut texts = std::mem::take(&mut self.texts);
         texts.extend(self.page.take().iter().map(ToString::to_string));
-        texts.push(self.feed.text());
+        texts.push(self.feed.text(NOW));
         texts.join("\n")
     }
 

@@ -61,8 +61,28 @@ pub enum Command {
     Estimate(EstimateOptions),
     /// Hardware in the loop: fly a vehicle at the other end of a serial port through the simulated world.
     Hil(HilOptions),
+    /// List the ports of a vehicle: what programs may do there, and what stops others.
+    Doors(TopicsOptions),
+    /// Make the key of a vehicle, or show what stations need of it.
+    #[command(subcommand)]
+    Key(KeyCommand),
     /// Play the golden flight: does this machine compute what it should?
     Golden(GoldenOptions),
+}
+
+/// What `key` does.
+#[derive(Debug, Subcommand)]
+pub enum KeyCommand {
+    /// Make a new key and a file for it that no other account can read.
+    New {
+        /// The file, which must not be there yet.
+        file: PathBuf,
+    },
+    /// Print the pass-phrase of ground stations and programs that speak MAVLink. It is made of the key, and does not give it away.
+    Mavlink {
+        /// A file with the key.
+        file: PathBuf,
+    },
 }
 
 impl Default for Command {
@@ -116,7 +136,7 @@ pub struct DoctorOptions {
     pub list_faults: bool,
 }
 
-/// Options of `topics`, `schedule` and `faults`.
+/// Options of `topics`, `schedule`, `faults` and `doors`.
 #[derive(Clone, Debug, Args)]
 pub struct TopicsOptions {
     #[command(flatten)]

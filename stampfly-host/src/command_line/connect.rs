@@ -3,8 +3,9 @@
 use crate::command_line::arguments::{ConnectOptions, VehiclePlace};
 use crate::command_line::doctor::port_of;
 use crate::command_line::failure::Failure;
+use crate::command_line::serve::page_address;
 use crate::connect::{Bridge, PORTS, Place, RadioPlace};
-use crate::ground::{Hub, Limits, Server, VehicleCard};
+use crate::ground::{Event, Hub, Limits, Server, VehicleCard};
 use crate::serve::{Key, OpenPorts, PortOption};
 use crate::vehicles::{self, ForVehicle};
 use stampfly_link::secure;
@@ -64,11 +65,21 @@ impl ForVehicle for Connect<'_> {
             ..VehicleCard::of::<V>(V::NAME, &V::default_config()).offering(offers)
         }]);
         let is_public = |wanted: &&PortOption| wanted.address.is_some_and(|address| !address.ip().is_loopback());
-        if let Some(public) = options.port.iter().filter(|wanted| wanted.name != "http").find(is_public) {
-            let why = "what a vehicle says on its cable is not signed, so programs on this machine alone may have it";
+        if let Some(public) = options.port.iter().find(is_public) {
+            let why = "the vehicle on a cable asks for no key, so programs on this machine alone may command it";
             return Err(format!("port '{}': {why}; '--port {0}=NUMBER' leaves it here", public.name).into());
         }
         let ports = Arc::new(OpenPorts::open(specs, &options.port, 0, None)?);
+        for error in ports.missed() {
+            eprintln!("stampfly: {error}; the vehicle is connected without it");
+        }
+        let pages = hub.clone();
+        ports.tell(move |ended| {
+            if ended.count.is_power_of_two() {
+                eprintln!("stampfly: {ended}");
+                pages.tell_all(0, &Event::Text { text: ended.to_string() });
+            }
+        });
         let mut server = None;
         for (port, address) in ports.places() {
             let does = match port.transport {
@@ -76,7 +87,7 @@ impl ForVehicle for Connect<'_> {
                     let started = Server::start(hub.clone(), *address, Limits::default()).map_err(|error| {
                         format!("port '{}' at {address}: {error}; '--port {0}=NUMBER' chooses another", port.name)
                     })?;
-                    let does = format!("open http://{} in a browser", started.address());
+                    let does = format!("open {} in a browser", page_address(&started, None));
                     server = Some(started);
                     does
                 }
@@ -86,7 +97,7 @@ impl ForVehicle for Connect<'_> {
             outln!("{:<12} {:<42} {does}", port.name, port.meaning);
         }
         outln!("{:<12} {:<42} at {place}", "vehicle", V::NAME);
-        let closing = ports.clone();
+        let (closing, counting) = (ports.clone(), ports.clone());
         ctrlc::set_handler(move || closing.close())?;
         let until = options.seconds.map(|seconds| Instant::now() + Duration::from_secs_f32(seconds));
         let folder = options.out.clone();
@@ -100,6 +111,9 @@ impl ForVehicle for Connect<'_> {
             bridge = bridge.recording(file.clone()).map_err(failed)?;
         }
         let carried = bridge.run(until);
+        if counting.ended() > 0 {
+            eprintln!("{} connections ended that did not speak their port's language", counting.ended());
+        }
         drop(server);
         if let Some((file, counts)) = options.record.as_ref().zip(carried.record) {
             let [chunks, missing] = counts.map_err(|error| format!("{}: {error}", file.display()))?;

@@ -18,6 +18,7 @@ mod campaign;
 mod connect;
 mod demo;
 mod doctor;
+mod doors;
 mod engine;
 mod estimate;
 mod failure;
@@ -26,6 +27,7 @@ mod faults;
 mod fly;
 mod golden;
 mod hil;
+mod key;
 mod log;
 mod modes;
 mod replay;
@@ -57,6 +59,8 @@ pub fn run() -> ExitCode {
         Command::Campaign(options) => campaign::run(&options),
         Command::Estimate(options) => estimate::run(&options),
         Command::Hil(options) => hil::run(&options),
+        Command::Doors(options) => doors::run(&options),
+        Command::Key(command) => key::run(&command),
         Command::Golden(options) => golden::run(&options),
     };
     result.unwrap_or_else(|failure| failure::tell(&failure))

@@ -7,7 +7,7 @@ use crate::command_line::arguments::ServeOptions;
 use crate::command_line::failure::Failure;
 use crate::command_line::fly::{figures, write_report};
 use crate::flown::{Flown, fly};
-use crate::ground::{Client, Hub, Limits, Server, VehicleCard, Watch};
+use crate::ground::{self, Client, Event, Hub, Limits, Server, VehicleCard, Watch};
 use crate::log_file::LogFile;
 use crate::recorder::Recorder;
 use crate::serve::{Key, OpenPorts, Page, PortOption, RecordOut};
@@ -49,7 +49,7 @@ impl ForVehicle for Serve<'_> {
         }
         let hub = hub::<V>(options)?;
         let ports = open::<V>(options, &hub)?;
-        let _server = ground(&ports, &hub)?;
+        let _server = ground(options, &ports, &hub)?;
         let (closing, over) = (ports.clone(), Arc::new(AtomicBool::new(false)));
         let are_over = over.clone();
         ctrlc::set_handler(move || {
@@ -71,6 +71,7 @@ impl ForVehicle for Serve<'_> {
             threads.into_iter().map(thread::ScopedJoinHandle::join).collect()
         });
         over.store(true, Ordering::Relaxed);
+        say_ended(&ports);
         let mut all_well = true;
         for ended in ended {
             for (flown, hash, log) in ended.map_err(|_| "a vehicle's thread has failed")?? {
@@ -79,6 +80,14 @@ impl ForVehicle for Serve<'_> {
             }
         }
         Ok(if all_well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+}
+
+/// Says how many connections were ended because they spoke another language than their port.
+fn say_ended(ports: &[Arc<OpenPorts>]) {
+    let count: u64 = ports.iter().map(|ports| ports.ended()).sum();
+    if count > 0 {
+        eprintln!("{count} connections ended that did not speak their port's language");
     }
 }
 
@@ -97,14 +106,34 @@ fn hub<V: Vehicle>(options: &ServeOptions) -> Result<Arc<Hub>, Failure> {
 }
 
 /// Starts the ground station where the first vehicle has its port for one, if it has and it is not off.
-fn ground(ports: &[Arc<OpenPorts>], hub: &Arc<Hub>) -> Result<Option<Server>, Failure> {
-    let place =
-        ports.first().and_then(|ports| ports.places().iter().find(|(port, _)| port.transport == Transport::Page));
+fn ground(options: &ServeOptions, ports: &[Arc<OpenPorts>], hub: &Arc<Hub>) -> Result<Option<Server>, Failure> {
+    let first = ports.first();
+    let place = first.and_then(|ports| ports.places().iter().find(|(port, _)| port.transport == Transport::Page));
     let Some((port, address)) = place else { return Ok(None) };
-    let server = Server::start(hub.clone(), *address, Limits::default())
-        .map_err(|error| format!("port '{}' at {address}: {error}; '--port {0}=NUMBER' chooses another", port.name))?;
-    outln!("{:<12} {:<42} open http://{} in a browser", port.name, port.meaning, server.address());
-    Ok(Some(server))
+    let secret = first.and_then(|ports| ports.page_secret());
+    match Server::with_secret(hub.clone(), *address, Limits::default(), secret.clone()) {
+        Ok(server) => {
+            outln!("{:<12} {:<42} open {} in a browser", port.name, port.meaning, page_address(&server, secret));
+            Ok(Some(server))
+        }
+        Err(error) if options.port.iter().any(|option| option.name == port.name) => {
+            let name = port.name;
+            Err(format!("port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another").into())
+        }
+        Err(error) => {
+            let name = port.name;
+            eprintln!(
+                "stampfly: port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another, the vehicle flies without it"
+            );
+            Ok(None)
+        }
+    }
+}
+
+/// What a browser is to open.
+pub(super) fn page_address(server: &Server, secret: Option<String>) -> String {
+    let end = secret.map_or_else(String::new, |secret| format!("/#{secret}"));
+    format!("http://{}{end}", server.address())
 }
 
 /// The page's end of one vehicle's port.
@@ -115,7 +144,7 @@ struct PageOf {
 
 impl Page for PageOf {
     fn take(&self) -> Vec<(SocketAddr, Vec<u8>)> {
-        let asks = self.hub.asks(self.vehicle).into_iter();
+        let asks = self.hub.asks(self.vehicle, ground::now()).into_iter();
         asks.filter_map(|(client, asked)| Some((address(client), serde_json::to_vec(&asked).ok()?))).collect()
     }
 
@@ -123,6 +152,14 @@ impl Page for PageOf {
         if let (SocketAddr::V6(to), Ok(text)) = (to, std::str::from_utf8(bytes)) {
             self.hub.send(Client::of(to.ip().to_bits() as u64), text);
         }
+    }
+
+    fn gone(&self) -> Vec<SocketAddr> {
+        self.hub.gone(self.vehicle).into_iter().map(address).collect()
+    }
+
+    fn tell(&self, text: &str) {
+        self.hub.tell_all(self.vehicle, &Event::Text { text: text.to_owned() });
     }
 }
 
@@ -151,6 +188,17 @@ fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<Op
         for (port, place) in opened.terminals() {
             outln!("{}{:<12} {:<42} is {place}", which(number), port.name, port.meaning);
         }
+        for error in opened.missed() {
+            eprintln!("stampfly: {}{error}; the vehicle flies without it", which(number));
+        }
+        let pages = hub.clone();
+        opened.tell(move |ended| {
+            // Each counts, and some of them are said.
+            if ended.count.is_power_of_two() {
+                eprintln!("stampfly: {ended}");
+                pages.tell_all(number, &Event::Text { text: ended.to_string() });
+            }
+        });
         all.push(Arc::new(opened.with_page(PageOf { hub: hub.clone(), vehicle: number })));
     }
     Ok(all)

@@ -5,6 +5,7 @@
 //! | [`Place`] | where the line is, and how it is opened |
 //! | [`RadioPlace`] | where a vehicle in a network is, and the sealed frames that go there |
 //! | `way.rs` | one or the other |
+//! | `crew.rs` | which page and which program commands |
 //! | `translation.rs` | what a cable says and what those frames say |
 //! | `questions.rs` | parameters and lines, asked until they are answered |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
@@ -12,6 +13,7 @@
 //!
 //! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables pulled out. Pages are told.
 
+mod crew;
 mod log;
 mod orders;
 mod place;
@@ -25,7 +27,9 @@ mod way;
 pub use place::{Line, Place, PlaceError};
 pub use sealed::{RadioPlace, RadioPlaceError};
 
+use crate::ground;
 use crate::serve::OpenPorts;
+use crew::Crew;
 use log::Log;
 use record::Record;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
@@ -35,6 +39,8 @@ use stampfly_link::mavlink::MavlinkDecoder;
 use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::secure::Key;
 use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
+use stampfly_types::Message as _;
+use stampfly_types::messages::FlightStatus;
 use station::{Said, Station};
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -44,7 +50,12 @@ use std::time::{Duration, Instant};
 use way::{Open, Way};
 
 /// Where other programs find the vehicle.
-pub const PORTS: &[PortSpec] = &[PortSpec::PAGE, PortSpec::MAVLINK_UDP, PortSpec::MAVLINK_TCP];
+pub const PORTS: &[PortSpec] = &[
+    PortSpec::PAGE,
+    PortSpec::MAVLINK_UDP,
+    // A port that every program of this machine can open is there when it is wanted.
+    PortSpec { when_named: true, ..PortSpec::MAVLINK_TCP },
+];
 /// The vehicle's page and hub have one vehicle.
 const ONLY: usize = 0;
 /// A line that cannot be opened is tried again after this long.
@@ -86,6 +97,9 @@ struct Ends<V: Vehicle> {
     folder: PathBuf,
     log: Option<Log<V>>,
     logs: usize,
+    crew: Crew,
+    /// The place of `flight_status` among the topics.
+    status: Option<usize>,
     /// The flight record, if it is wanted.
     record: Option<Record>,
     /// The vehicle's newest instant.
@@ -109,6 +123,7 @@ pub struct Bridge<V: Vehicle> {
     station: Station,
     ends: Ends<V>,
     state: State,
+    begun: Instant,
     /// The topics that are shown, and when they were last.
     shown: BTreeMap<usize, Instant>,
 }
@@ -162,6 +177,10 @@ impl<V: Vehicle> Ends<V> {
         }
         self.clock = self.clock.max(at);
         self.watch.note(topic, at, words);
+        let status = || words.try_into().ok().and_then(FlightStatus::from_words);
+        if Some(topic) == self.status && status().is_some_and(|status| !status.armed) {
+            self.crew.release();
+        }
         if let Some(log) = &mut self.log {
             log.note(topic, at, words);
         }
@@ -188,15 +207,17 @@ impl<V: Vehicle> Ends<V> {
     }
 
     /// What programs say in MAVLink, frame by frame, so that none lies within another.
-    fn programs(&mut self, put: &mut Vec<u8>) {
-        let Self { ports, programs, .. } = self;
+    fn programs(&mut self, now: stampfly_types::Instant, put: &mut Vec<u8>) {
+        let Self { ports, programs, crew, .. } = self;
         ports.receive(None, &mut |client, heard| match heard {
             Heard::Opened => drop(programs.insert(client, MavlinkDecoder::new())),
             Heard::Closed => drop(programs.remove(&client)),
             Heard::Bytes(bytes) => {
                 let decoder = programs.entry(client).or_default();
                 for byte in bytes {
-                    if let Some(frame) = decoder.feed(*byte) {
+                    if let Some(frame) = decoder.feed(*byte)
+                        && crew.may(now, client, [frame.system, frame.component], frame.id)
+                    {
                         put.extend(frame.bytes());
                     }
                 }
@@ -239,11 +260,13 @@ impl<V: Vehicle> Bridge<V> {
             folder,
             log: None,
             logs: 0,
+            crew: Crew::default(),
+            status: topics::<V>().iter().position(|topic| topic.name == "flight_status"),
             record: None,
             clock: stampfly_types::Instant::ZERO,
             restarted: false,
         };
-        Some(Self { way, station, ends, state: State::Up, shown: BTreeMap::new() })
+        Some(Self { way, station, ends, state: State::Up, begun: Instant::now(), shown: BTreeMap::new() })
     }
 
     /// The same, which asks the vehicle for its compact flight record and writes it into a file.
@@ -277,6 +300,11 @@ impl<V: Vehicle> Bridge<V> {
         Carried { was_heard, record }
     }
 
+    /// Time since it began.
+    fn now(&self) -> stampfly_types::Instant {
+        stampfly_types::Instant::from_micros(self.begun.elapsed().as_micros() as u64)
+    }
+
     /// Says how the line is, when that is new.
     fn change(&mut self, state: State, text: String) {
         if core::mem::replace(&mut self.state, state) != state {
@@ -288,10 +316,10 @@ impl<V: Vehicle> Bridge<V> {
     fn wait(&mut self) {
         let until = Instant::now() + AGAIN;
         while Instant::now() < until && !self.ends.ports.are_closed() {
-            for (client, asked) in self.ends.hub.asks(ONLY) {
+            for (client, asked) in self.ends.hub.asks(ONLY, ground::now()) {
                 self.ends.take(Said::Answer(client, asked, Err("the line to the vehicle is gone".into())));
             }
-            self.ends.programs(&mut Vec::new());
+            self.ends.programs(self.now(), &mut Vec::new());
             thread::sleep(place::LOOK);
         }
     }
@@ -309,9 +337,18 @@ impl<V: Vehicle> Bridge<V> {
                 Err(error) => return Some(error),
             };
             let now = Instant::now();
-            let Self { station, ends, shown, .. } = self;
+            let Self { station, ends, shown, begun, .. } = self;
             station.hear(now, part.get(..length).unwrap_or_default(), &mut |said| ends.take(said));
-            for (client, asked) in ends.hub.asks(ONLY) {
+            let passed = stampfly_types::Instant::from_micros(begun.elapsed().as_micros() as u64);
+            for (client, asked) in ends.hub.asks(ONLY, ground::now()) {
+                match ends.crew.ask(passed, client.number(), &asked.ask) {
+                    Ok(Some(())) => {}
+                    Ok(None) => continue,
+                    Err(refusal) => {
+                        ends.take(Said::Answer(client, asked, Err(refusal.to_string())));
+                        continue;
+                    }
+                }
                 // It may have changed them.
                 if matches!(&asked.ask, Ask::Console { line } if line.starts_with("param") || line.starts_with("autotune"))
                 {
@@ -319,7 +356,10 @@ impl<V: Vehicle> Bridge<V> {
                 }
                 station.ask(now, client, asked, &mut put, &mut |said| ends.take(said));
             }
-            ends.programs(&mut put);
+            for page in ends.hub.gone(ONLY) {
+                ends.crew.leave(page.number());
+            }
+            ends.programs(passed, &mut put);
             if now.duration_since(looked) >= LOOK {
                 looked = now;
                 let again = now.duration_since(told) >= TOLD;

@@ -108,6 +108,9 @@ pub struct Station {
     words: Vec<u32>,
     /// When a sound frame came.
     heard: Option<Instant>,
+    /// The vehicle's clock, ms, in its newest sample, and when that came. With it the station says when it asks something.
+    clock: Option<(u32, Instant)>,
+    now: Instant,
 }
 
 impl Station {
@@ -133,6 +136,8 @@ impl Station {
             is_foreign: false,
             words: Vec::new(),
             heard: None,
+            clock: None,
+            now,
         }
     }
 
@@ -151,13 +156,14 @@ impl Station {
     pub fn lost(&mut self, tell: Tell<'_>) {
         self.expire(None, tell);
         (self.split, self.decoder, self.assembly) = (Split::new(), MavlinkDecoder::new(), Assembly::default());
-        (self.heard, self.is_foreign) = (None, false);
+        (self.heard, self.clock, self.is_foreign) = (None, None, false);
         self.next = self.settings.len();
         self.text.clear();
     }
 
     /// Takes what has come.
     pub fn hear(&mut self, now: Instant, bytes: &[u8], tell: Tell<'_>) {
+        self.now = now;
         let clock = stampfly_types::Instant::from_micros(now.duration_since(self.begun).as_micros() as u64);
         for byte in bytes {
             match self.split.feed(clock, *byte) {
@@ -215,6 +221,14 @@ impl Station {
         }
         match payload {
             Payload::Sample(sample) => {
+                let at = (sample.at.as_micros() / 1_000) as u32;
+                // A vehicle that has started anew has another clock.
+                let is_newest = |(before, _): (u32, Instant)| {
+                    (at.wrapping_sub(before) as i32) >= 0 || before.wrapping_sub(at) > 500
+                };
+                if self.clock.is_none_or(is_newest) {
+                    self.clock = Some((at, now));
+                }
                 self.words.clear();
                 self.words.extend(sample.words());
                 tell(Said::Sample(sample.topic.into(), sample.at, &self.words));
@@ -271,6 +285,7 @@ impl Station {
 
     /// Asks the vehicle what a page has asked for. Answers at once what no vehicle needs to be asked.
     pub fn ask(&mut self, now: Instant, client: Client, asked: Asked, put: &mut Vec<u8>, tell: Tell<'_>) {
+        self.now = now;
         let guided = |kind| Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() });
         let (payload, asked) = match asked.ask.clone() {
             Ask::Guided(Guided::Kill {}) => (Payload::Kill, asked),
@@ -352,6 +367,7 @@ impl Station {
 
     /// What is due: the next line, parameters of the list, an end to patience.
     pub fn poll(&mut self, now: Instant, put: &mut Vec<u8>, tell: Tell<'_>) {
+        self.now = now;
         if self.line.is_none()
             && let Some((client, asked, line)) = self.lines.pop_front()
         {
@@ -408,8 +424,9 @@ impl Station {
     /// Puts a payload into frames. Returns its number; `None` when a value in it must not be used.
     fn say(&mut self, payload: &Payload<'_>, put: &mut Vec<u8>) -> Option<u16> {
         self.number = self.number.wrapping_add(1);
+        let said = self.clock.map(|(at, heard)| at.wrapping_add(self.now.duration_since(heard).as_millis() as u32));
         let Self { table, number, writer, .. } = self;
-        let sound = Envelope::write(*table, *number, payload, &mut |part| {
+        let sound = Envelope::write(*table, *number, said, payload, &mut |part| {
             let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) else { return };
             let mut room = [0; LONGEST];
             let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);

@@ -149,7 +149,7 @@ impl Translation {
 
 /// Puts an envelope into frames for the station.
 fn put(writer: &mut MavlinkWriter, frames: &mut VecDeque<u8>, table: u16, number: u16, payload: &Payload<'_>) {
-    Envelope::write(table, number, payload, &mut |part| {
+    Envelope::write(table, number, None, payload, &mut |part| {
         let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) else { return };
         let mut room = [0; LONGEST];
         let frame = writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room);

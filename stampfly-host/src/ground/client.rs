@@ -5,15 +5,17 @@
 //! nothing for too long is cut off.
 
 use super::limits::Limits;
+use super::pulse::Pulse;
 use crate::waited::{has_only_waited, wait_at_most};
 use stampfly_ground::Feed;
-use stampfly_ground::ask::{AskError, Asked, Incoming, Reply};
+use stampfly_ground::ask::{Ask, AskError, Asked, Incoming, Reply};
 use stampfly_ground::{Connection, Hub};
 use std::io::{self, ErrorKind};
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::protocol::frame::coding::CloseCode;
+use tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
 /// Longest wait for an ask: as long may an answer wait.
@@ -31,6 +33,7 @@ struct Page {
     socket: WebSocket<TcpStream>,
     feed: Feed,
     period: Duration,
+    pulse: Pulse,
 }
 
 /// Serves a client whose handshake has been answered; `rest` are the bytes that came behind it.
@@ -45,10 +48,29 @@ pub(super) fn serve(hub: Arc<Hub>, stream: TcpStream, rest: Vec<u8>, limits: &Li
         return;
     }
     let socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
-    let (connection, feed) = (hub.connect(), Feed::new(hub.clone()));
-    let mut page = Page { hub, connection, socket, feed, period: period(RATE) };
-    // Whatever ends it, nobody is left to be told.
-    let _ = page.run(limits, is_over);
+    let session = session();
+    let connection = if session.is_empty() { hub.connect() } else { hub.connect_as(&session) };
+    let feed = Feed::new(hub.clone());
+    let mut page = Page { hub, connection, socket, feed, period: period(RATE), pulse: Pulse::new(super::now()) };
+    let ended = page.run(&session, limits, is_over);
+    // What breaks the protocol is told so; another end leaves no one to be told.
+    if let Err(Error::Protocol(_) | Error::Capacity(_) | Error::Utf8(_)) = ended {
+        let code = match ended {
+            Err(Error::Capacity(_)) => CloseCode::Size,
+            Err(Error::Utf8(_)) => CloseCode::Invalid,
+            _ => CloseCode::Protocol,
+        };
+        let _ = page.socket.close(Some(CloseFrame { code, reason: "".into() }));
+        let _ = page.socket.flush();
+    }
+}
+
+/// What no other page can guess.
+fn session() -> String {
+    let mut bytes = [0; 16];
+    // Without random numbers of the system there is no session that could be resumed.
+    let is_random = getrandom::fill(&mut bytes).is_ok();
+    if is_random { bytes.iter().map(|byte| format!("{byte:02x}")).collect() } else { String::new() }
 }
 
 fn period(rate: u8) -> Duration {
@@ -61,8 +83,8 @@ fn is_full(error: &Error) -> bool {
 }
 
 impl Page {
-    fn run(&mut self, limits: &Limits, is_over: &dyn Fn() -> bool) -> Result<(), Error> {
-        let hello = self.hub.hello();
+    fn run(&mut self, session: &str, limits: &Limits, is_over: &dyn Fn() -> bool) -> Result<(), Error> {
+        let hello = self.hub.hello(self.connection.client(), session, super::now());
         self.put(hello.into())?;
         let mut due = Instant::now();
         let mut stalled: Option<Instant> = None;
@@ -77,7 +99,7 @@ impl Page {
             if now >= due {
                 match stalled {
                     None => {
-                        let text = self.feed.text();
+                        let text = self.feed.text(super::now());
                         self.put(text.into())?;
                     }
                     Some(_) => self.feed.dropped += 1,
@@ -124,9 +146,24 @@ impl Page {
                 self.feed.subscribe(topics);
                 self.hub.answer_to(client, None, id, Ok(Reply::text("subscribed")));
             }
+            Ok(Incoming::Resume { id, session }) => {
+                let is_known = self.hub.resume(&self.connection, &session);
+                let answer = if is_known { Ok(Reply::text("resumed")) } else { Err("no such session".into()) };
+                self.hub.answer_to(self.connection.client(), None, id, answer);
+            }
             Ok(Incoming::Ask(asked)) => {
-                let Asked { vehicle, id, .. } = asked;
-                if let Err(why) = self.hub.ask(client, asked) {
+                let (Asked { vehicle, id, at, .. }, is_repeated) = (&asked, asked.ask.is_repeated());
+                let (vehicle, id) = (*vehicle, *id);
+                let now = super::now();
+                let held = self.pulse.hear(now, matches!(asked.ask, Ask::Alive {}));
+                let taken = match at {
+                    Some(_) => self.hub.ask(client, asked, now),
+                    None => self.hub.ask_since(client, asked, held, now),
+                };
+                // What is said again and again has no answer.
+                if let Err(why) = taken
+                    && !is_repeated
+                {
                     refuse(Some(vehicle), id, why.to_string());
                 }
             }

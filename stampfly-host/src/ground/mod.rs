@@ -14,10 +14,22 @@ mod client;
 pub mod demo;
 mod limits;
 mod page;
+mod pulse;
 mod server;
+
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// The server's clock: time since it was looked at first in this process. All hubs have the same.
+#[must_use]
+pub fn now() -> Duration {
+    static BEGUN: OnceLock<Instant> = OnceLock::new();
+    BEGUN.get_or_init(Instant::now).elapsed()
+}
 
 pub use limits::Limits;
 pub use server::Server;
 pub use stampfly_ground::{
-    Calibration, Client, Connection, Event, Hub, NotAsked, ParameterCard, Reply, TopicCard, VehicleCard, Watch, ask,
+    Calibration, Client, Connection, Event, FRESH, Hub, LogSoFar, NotAsked, ParameterCard, Reply, TopicCard,
+    VehicleCard, Watch, ask,
 };

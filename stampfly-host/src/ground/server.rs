@@ -1,21 +1,24 @@
 //! The server of the page: a thread that accepts, and one for each connection.
 //!
-//! For one person at a desk and a few programs. Use a loopback address unless others on the network are to fly the vehicles:
-//! there is no password.
+//! For one person at a desk and a few programs. Where others can reach it, give it a [secret](Server::with_secret).
 
 use super::client;
 use super::limits::Limits;
 use super::page;
 use crate::waited::has_only_waited;
-use stampfly_ground::Hub;
 use stampfly_ground::http::{self, Hosts, Refusal, Request, Wanted};
+use stampfly_ground::{Hub, LogSoFar};
+use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
+
+/// Bytes of a log that are in memory.
+const PART: usize = 64 << 10;
 
 /// A server that runs until it is dropped.
 ///
@@ -44,8 +47,61 @@ struct Common {
     hub: Arc<Hub>,
     hosts: Hosts,
     limits: Limits,
+    /// What has to follow the addresses.
+    secret: Option<String>,
     is_over: Arc<AtomicBool>,
-    open: AtomicUsize,
+    /// Requests that are not answered yet, oldest first.
+    requests: Mutex<VecDeque<(u64, TcpStream)>>,
+    sockets: AtomicUsize,
+    logs: AtomicUsize,
+}
+
+impl Common {
+    fn requests(&self) -> MutexGuard<'_, VecDeque<(u64, TcpStream)>> {
+        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes another request. Where there are too many, the oldest one is ended.
+    fn begin(&self, number: u64, stream: &TcpStream) -> io::Result<()> {
+        let stream = stream.try_clone()?;
+        let mut requests = self.requests();
+        if requests.len() >= self.limits.requests
+            && let Some((_, oldest)) = requests.pop_front()
+        {
+            let _ = oldest.shutdown(Shutdown::Both);
+        }
+        requests.push_back((number, stream));
+        Ok(())
+    }
+
+    /// This request is answered, or has become something else.
+    fn end(&self, number: u64) {
+        self.requests().retain(|(other, _)| *other != number);
+    }
+
+    /// Does it know the secret, if there is one? Compared in a time that does not depend on where they differ.
+    fn knows(&self, said: Option<&str>) -> bool {
+        let Some(secret) = &self.secret else { return true };
+        let said = said.unwrap_or_default();
+        let differs = secret.bytes().zip(said.bytes()).fold(0, |differs, (one, other)| differs | (one ^ other));
+        secret.len() == said.len() && differs == 0
+    }
+}
+
+/// One of a number of places, until it is dropped.
+struct Place<'c>(&'c AtomicUsize);
+
+impl<'c> Place<'c> {
+    fn take(taken: &'c AtomicUsize, most: usize) -> Option<Self> {
+        let place = Place(taken);
+        (taken.fetch_add(1, Ordering::Relaxed) < most).then_some(place)
+    }
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 impl Server {
@@ -54,12 +110,28 @@ impl Server {
     /// # Errors
     /// When the system refuses the address.
     pub fn start(hub: Arc<Hub>, listen: SocketAddr, limits: Limits) -> io::Result<Self> {
+        Self::with_secret(hub, listen, limits, None)
+    }
+
+    /// The same. With a secret, only pages whose address ends with it see and ask anything: letters and digits.
+    ///
+    /// # Errors
+    /// When the system refuses the address.
+    pub fn with_secret(hub: Arc<Hub>, listen: SocketAddr, limits: Limits, secret: Option<String>) -> io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
         let address = listener.local_addr()?;
         let hosts = if address.ip().is_loopback() { Hosts::Loopback } else { Hosts::Addresses };
         let is_over = Arc::new(AtomicBool::new(false));
-        let common = Common { hub, hosts, limits, is_over: is_over.clone(), open: AtomicUsize::new(0) };
-        let common = Arc::new(common);
+        let common = Arc::new(Common {
+            hub,
+            hosts,
+            limits,
+            secret,
+            is_over: is_over.clone(),
+            requests: Mutex::default(),
+            sockets: AtomicUsize::new(0),
+            logs: AtomicUsize::new(0),
+        });
         let thread = thread::Builder::new().name("ground".into()).spawn(move || accept(&listener, &common))?;
         Ok(Self { address, is_over, thread: Some(thread) })
     }
@@ -88,17 +160,8 @@ impl Drop for Server {
     }
 }
 
-/// One of the open connections.
-struct Place(Arc<Common>);
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.open.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 fn accept(listener: &TcpListener, common: &Arc<Common>) {
-    for stream in listener.incoming() {
+    for (number, stream) in (0..).zip(listener.incoming()) {
         if common.is_over.load(Ordering::Relaxed) {
             return;
         }
@@ -107,50 +170,84 @@ fn accept(listener: &TcpListener, common: &Arc<Common>) {
             thread::sleep(Duration::from_millis(10));
             continue;
         };
-        let before = common.open.fetch_add(1, Ordering::Relaxed);
-        let place = Place(common.clone());
-        if before >= common.limits.connections {
-            // Nobody waits for this client: what the system takes at once has to do.
-            let _ = stream.set_nonblocking(true);
-            let _ = (&stream).write(http::refuse(Refusal::Busy).as_bytes());
-            let _ = stream.shutdown(Shutdown::Write);
+        if common.begin(number, &stream).is_err() {
             continue;
         }
+        let of_thread = common.clone();
         // Without a thread the client is left alone: its connection closes.
-        let _ = thread::Builder::new().name("ground client".into()).spawn(move || {
-            let _ = attend(&place.0, stream);
+        let begun = thread::Builder::new().name("ground client".into()).spawn(move || {
+            let _ = attend(&of_thread, number, stream);
+            of_thread.end(number);
         });
+        if begun.is_err() {
+            common.end(number);
+        }
     }
 }
 
-fn attend(common: &Common, mut stream: TcpStream) -> io::Result<()> {
+fn attend(common: &Common, number: u64, mut stream: TcpStream) -> io::Result<()> {
     stream.set_write_timeout(Some(common.limits.stall))?;
     let mut bytes = Vec::new();
-    let Request { wanted, length } = match read_request(common, &mut stream, &mut bytes)? {
+    let Request { wanted, secret, length } = match read_request(common, &mut stream, &mut bytes)? {
         Ok(request) => request,
-        Err(refusal) => return answer(&mut stream, http::refuse(refusal).as_bytes(), &[]),
+        Err(refusal) => return refuse(&mut stream, refusal),
     };
+    // The page itself shows nothing and knows nothing: the secret is in its address, behind what a browser sends.
+    if wanted != Wanted::Page && !common.knows(secret.as_deref()) {
+        return refuse(&mut stream, Refusal::Secret);
+    }
     match wanted {
         Wanted::Page => {
             let (html, policy) = page::html();
-            let head = http::head("200 OK", "text/html; charset=utf-8", html.len(), &policy);
+            let head = http::head("200 OK", "text/html; charset=utf-8", html.len() as u64, &policy);
             answer(&mut stream, head.as_bytes(), html.as_bytes())
         }
-        Wanted::Log(vehicle) => match common.hub.log(vehicle) {
-            Some(log) => {
-                let name = format!("Content-Disposition: attachment; filename=\"vehicle-{vehicle}.ulg\"\r\n");
-                let head = http::head("200 OK", "application/octet-stream", log.len(), &name);
-                answer(&mut stream, head.as_bytes(), &log)
+        Wanted::Log(vehicle) => {
+            common.end(number);
+            let Some(_place) = Place::take(&common.logs, common.limits.logs) else {
+                return refuse(&mut stream, Refusal::Busy);
+            };
+            match common.hub.log(vehicle) {
+                Some(Ok(log)) => send_log(&common.limits, &mut stream, vehicle, log),
+                Some(Err(_)) => refuse(&mut stream, Refusal::Unreadable),
+                None => refuse(&mut stream, Refusal::NotFound),
             }
-            None => answer(&mut stream, http::refuse(Refusal::NotFound).as_bytes(), &[]),
-        },
+        }
         Wanted::Socket(key) => {
+            common.end(number);
+            let Some(_place) = Place::take(&common.sockets, common.limits.sockets) else {
+                return refuse(&mut stream, Refusal::Busy);
+            };
             stream.write_all(http::upgrade(&derive_accept_key(key.as_bytes())).as_bytes())?;
             let is_over = || common.is_over.load(Ordering::Relaxed);
             client::serve(common.hub.clone(), stream, bytes.split_off(length), &common.limits, &is_over);
             Ok(())
         }
     }
+}
+
+/// Sends a log part by part, as it is on the disk. A client that is slower than the limit gets a part of it.
+fn send_log(limits: &Limits, stream: &mut TcpStream, vehicle: usize, log: LogSoFar) -> io::Result<()> {
+    let LogSoFar { length, mut bytes } = log;
+    let name = format!("Content-Disposition: attachment; filename=\"vehicle-{vehicle}.ulg\"\r\n");
+    stream.write_all(http::head("200 OK", "application/octet-stream", length, &name).as_bytes())?;
+    let (begun, mut sent, mut part) = (Instant::now(), 0, vec![0; PART]);
+    loop {
+        let count = bytes.read(&mut part)?;
+        if count == 0 {
+            return end(stream);
+        }
+        stream.write_all(part.get(..count).unwrap_or_default())?;
+        sent += count as u64;
+        let allowed = limits.stall + Duration::from_secs(sent / u64::from(limits.slowest.max(1)));
+        if begun.elapsed() > allowed {
+            return Err(ErrorKind::TimedOut.into());
+        }
+    }
+}
+
+fn refuse(stream: &mut TcpStream, refusal: Refusal) -> io::Result<()> {
+    answer(stream, http::refuse(refusal).as_bytes(), &[])
 }
 
 /// Reads until there is a request or the time is over. What has been read stays in `bytes`.
@@ -181,6 +278,10 @@ fn read_request(common: &Common, stream: &mut TcpStream, bytes: &mut Vec<u8>) ->
 fn answer(stream: &mut TcpStream, head: &[u8], body: &[u8]) -> io::Result<()> {
     stream.write_all(head)?;
     stream.write_all(body)?;
+    end(stream)
+}
+
+fn end(stream: &mut TcpStream) -> io::Result<()> {
     stream.shutdown(Shutdown::Write)?;
     // A connection that is closed with bytes unread is reset, and the answer may be lost. A little of what the client still
     // sends is read, for a little time.

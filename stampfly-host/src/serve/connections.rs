@@ -1,14 +1,17 @@
 //! The programs that are connected to TCP ports: one thread reads, one writes, and a queue of bounded length between the flight
-//! and the writer, so that nobody who reads slowly can hold up a flight.
+//! and the writer, so that a program that reads slowly does not hold up a flight.
 
 use super::events::{Events, POLL};
+use super::greeting::{Foreign, Greeting};
 use crate::waited::has_only_waited;
-use stampfly_sim::vehicle::{Client, Heard};
+use stampfly_sim::vehicle::{Client, Heard, PortSpec};
 use std::collections::HashMap;
+use std::fmt;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Most connections to one port.
 const MOST: usize = 16;
@@ -17,22 +20,72 @@ const WAITING: usize = 256;
 /// Bytes read at once.
 const PART: usize = 2048;
 
+/// A connection was ended because it does not speak the language of its port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// Name of the port.
+    pub port: &'static str,
+    /// What it speaks instead.
+    pub speaks: Foreign,
+    /// How many were ended at the ports of this vehicle, with this one.
+    pub count: u64,
+}
+
+impl fmt::Display for Ended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { port, speaks, count } = self;
+        write!(f, "port '{port}': a connection that speaks {speaks} was ended, and nothing of it obeyed")?;
+        if *speaks == Foreign::Http {
+            f.write_str("; a page in a browser may try to fly the vehicle")?;
+        }
+        if *count > 1 { write!(f, " ({count} so far)") } else { Ok(()) }
+    }
+}
+
+/// Hears of connections that were ended.
+type Told = Box<dyn Fn(Ended) + Send + Sync>;
+
 /// The queue of every connection.
-#[derive(Debug, Default)]
-pub(super) struct Connections(Mutex<HashMap<Client, Queue>>);
+#[derive(Default)]
+pub(super) struct Connections {
+    queues: Mutex<HashMap<Client, Queue>>,
+    ended: AtomicU64,
+    told: OnceLock<Told>,
+}
 
 /// What waits for one to take it.
 #[derive(Debug)]
 struct Queue {
     bytes: SyncSender<Vec<u8>>,
-    /// Is what finds no room lost? A serial line stays, whoever reads there.
+    /// Is what finds no room lost? A serial line stays, whether or not a program reads there.
     stays: bool,
 }
 
 impl Connections {
-    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time. A serial line loses what nobody reads.
+    fn queues(&self) -> MutexGuard<'_, HashMap<Client, Queue>> {
+        self.queues.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// From now on this hears of connections that are ended.
+    pub fn tell(&self, told: Told) {
+        _ = self.told.set(told);
+    }
+
+    /// Connections that were ended because they do not speak the language of their port.
+    pub fn ended(&self) -> u64 {
+        self.ended.load(Ordering::Relaxed)
+    }
+
+    fn end(&self, port: &'static str, speaks: Foreign) {
+        let count = self.ended.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(told) = self.told.get() {
+            told(Ended { port, speaks, count });
+        }
+    }
+
+    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time. A serial line loses what no program reads.
     pub fn send(&self, to: &Client, bytes: &[u8]) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.queues();
         if all.get(to).is_some_and(|queue| queue.bytes.try_send(bytes.to_vec()).is_err() && !queue.stays) {
             all.remove(to);
         }
@@ -42,26 +95,26 @@ impl Connections {
     #[cfg(unix)]
     pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
         let (queue, waiting) = sync_channel(WAITING);
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(client, Queue { bytes: queue, stays: true });
+        self.queues().insert(client, Queue { bytes: queue, stays: true });
         waiting
     }
 
     /// Takes connections until the ports are closed.
-    pub fn accept(self: &Arc<Self>, port: usize, listener: &TcpListener, events: &Events) {
+    pub fn accept(self: &Arc<Self>, port: usize, spec: &'static PortSpec, listener: &TcpListener, events: &Events) {
         if listener.set_nonblocking(true).is_err() {
             return;
         }
         while events.are_open() {
             match listener.accept() {
-                Ok((stream, address)) => self.begin(Client { port, address }, stream, events),
+                Ok((stream, address)) => self.begin(Client { port, address }, spec, stream, events),
                 Err(_) => std::thread::sleep(POLL / 5),
             }
         }
     }
 
-    fn begin(self: &Arc<Self>, client: Client, stream: TcpStream, events: &Events) {
+    fn begin(self: &Arc<Self>, client: Client, spec: &'static PortSpec, stream: TcpStream, events: &Events) {
         let (queue, waiting) = sync_channel(WAITING);
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.queues();
         let prepared = stream
             .set_nonblocking(false)
             .and_then(|()| stream.set_nodelay(true))
@@ -77,34 +130,54 @@ impl Connections {
         std::thread::spawn(move || write(writer, &waiting));
         std::thread::spawn(move || {
             events.put(client, Heard::Opened);
-            read(stream, client, &connections, &events);
-            connections.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&client);
+            if let Err(speaks) = read(stream, client, spec, &connections, &events) {
+                connections.end(spec.name, speaks);
+            }
+            connections.queues().remove(&client);
             events.put(client, Heard::Closed);
         });
     }
 
     /// Who is connected.
     pub fn all(&self) -> Vec<Client> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).keys().copied().collect()
+        self.queues().keys().copied().collect()
     }
 
     fn has(&self, client: &Client) -> bool {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).contains_key(client)
+        self.queues().contains_key(client)
     }
 }
 
-fn read(mut stream: TcpStream, client: Client, connections: &Connections, events: &Events) {
-    let mut part = [0; PART];
-    while events.are_open() && connections.has(&client) {
+/// Reads until the connection is over.
+///
+/// # Errors
+/// When it does not speak the language of its port.
+fn read(
+    mut stream: TcpStream,
+    client: Client,
+    spec: &PortSpec,
+    connections: &Connections,
+    events: &Events,
+) -> Result<(), Foreign> {
+    let (mut part, mut greeting) = ([0; PART], Greeting::new(spec.speech));
+    let mut heard = Ok(());
+    while heard.is_ok() && events.are_open() && connections.has(&client) {
         match stream.read(&mut part) {
             Ok(0) => break,
-            // Waits while the flight has much to hear: the sender is held up, not the flight.
-            Ok(length) => events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default())),
+            Ok(length) => {
+                heard = greeting.hear(part.get(..length).unwrap_or_default()).map(|bytes| {
+                    // Waits while the flight has much to hear: the sender is held up, not the flight.
+                    if !bytes.is_empty() {
+                        events.put(client, Heard::Bytes(&bytes));
+                    }
+                });
+            }
             Err(error) if has_only_waited(&error) => {}
             Err(_) => break,
         }
     }
     _ = stream.shutdown(Shutdown::Both);
+    heard
 }
 
 /// Ends when the queue's other end is gone and everything in it is written, or the program takes no more.

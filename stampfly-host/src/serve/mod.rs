@@ -10,12 +10,15 @@
 
 mod connections;
 mod events;
+mod greeting;
 mod key;
 mod option;
 mod ports;
 mod record;
 mod terminal;
 
+pub use connections::Ended;
+pub use greeting::Foreign;
 pub use key::{Key, KeyError};
 pub use option::{PortOption, PortOptionError};
 pub use ports::{OpenError, OpenPorts, Page};

@@ -3,12 +3,12 @@
 //! Datagrams that come while the queue is full are lost, as in a socket's own buffer; streams wait. The flight takes a bounded
 //! number in a tick, so a flood costs datagrams and no time.
 
-use super::connections::Connections;
+use super::connections::{Connections, Ended};
 use super::events::{self, Event, Events, POLL};
 use super::key::Key;
 use super::option::PortOption;
 use super::terminal;
-use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports, Signing, Transport};
+use stampfly_sim::vehicle::{Client, Guard, Heard, PortSpec, Ports, Signing, Transport};
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::mpsc::Receiver;
@@ -33,21 +33,33 @@ enum Why {
     Failed(std::io::Error),
     /// Others could reach it, and there is no key.
     NoKey,
+    /// Others could reach it, and its language has no room for a key.
+    Loopback,
+    /// The key is asked for everywhere, and its language has no room for one.
+    Unsigned,
 }
 
 impl fmt::Display for OpenError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, address, why } = self;
+        write!(f, "port '{name}' at {address}: ")?;
         match why {
-            Why::Failed(error) => write!(
-                f,
-                "port '{name}' at {address}: {error}; '--port {name}=NUMBER' chooses another, '--port {name}=off' none"
-            ),
+            Why::Failed(error) => {
+                write!(f, "{error}; '--port {name}=NUMBER' chooses another, '--port {name}=off' none")
+            }
             Why::NoKey => write!(
                 f,
-                "port '{name}' at {address}: others than programs on this machine reach it, so what is said there must be \
-                 signed; '--key FILE' names the key, '--port {name}=NUMBER' leaves the port on this machine"
+                "programs on other machines reach it and can command the vehicle there, so they must know a key; \
+                 '--key FILE' names it, '--port {name}=NUMBER' leaves the port on this machine"
             ),
+            Why::Loopback => write!(
+                f,
+                "programs on other machines would reach it and could command the vehicle there, and its language has no \
+                 room for a key; '--port {name}=NUMBER' leaves the port on this machine"
+            ),
+            Why::Unsigned => {
+                write!(f, "stays closed: its language has no room for the key that '--sign-all' asks for everywhere")
+            }
         }
     }
 }
@@ -56,7 +68,7 @@ impl std::error::Error for OpenError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match &self.why {
             Why::Failed(error) => Some(error),
-            Why::NoKey => None,
+            Why::NoKey | Why::Loopback | Why::Unsigned => None,
         }
     }
 }
@@ -68,6 +80,12 @@ pub trait Page: Send + Sync {
 
     /// Answers.
     fn deliver(&self, to: SocketAddr, bytes: &[u8]);
+
+    /// Pages that are gone since the last call.
+    fn gone(&self) -> Vec<SocketAddr>;
+
+    /// Tells every page.
+    fn tell(&self, text: &str);
 }
 
 /// The open ports of one vehicle.
@@ -79,6 +97,7 @@ pub struct OpenPorts {
     connections: Arc<Connections>,
     page: Option<(usize, Box<dyn Page>)>,
     places: Vec<(&'static PortSpec, SocketAddr)>,
+    missed: Vec<OpenError>,
     terminals: Vec<(&'static PortSpec, String)>,
     key: Option<Key>,
     specs: &'static [PortSpec],
@@ -91,10 +110,12 @@ impl fmt::Debug for OpenPorts {
 }
 
 impl OpenPorts {
-    /// Opens those of the `number`-th vehicle, from zero, where the options want them. What is said at ports that others can reach is signed with the key.
+    /// Opens those of the `number`-th vehicle, from zero, where the options want them. At ports that others can reach, and with a
+    /// [key for everywhere](Key::everywhere) at all, commands need the key.
     ///
     /// # Errors
-    /// When one cannot be opened: another program has it, or it must be signed and there is no key.
+    /// When one that is named in the options cannot be opened, or must not: others could command the vehicle there without a key. One that is not
+    /// named is [missed](Self::missed) when another program has it.
     pub fn open(
         ports: &'static [PortSpec],
         options: &[PortOption],
@@ -102,76 +123,144 @@ impl OpenPorts {
         key: Option<Key>,
     ) -> Result<Self, OpenError> {
         let (events, heard) = events::queue();
-        let connections = Arc::new(Connections::default());
         let mut opened = Self {
             heard: Mutex::new(heard),
             sockets: Vec::new(),
-            connections: Arc::clone(&connections),
+            connections: Arc::default(),
             page: None,
             places: Vec::new(),
+            missed: Vec::new(),
             terminals: Vec::new(),
             key,
             specs: ports,
-            events: events.clone(),
+            events,
         };
         for (port, spec) in ports.iter().enumerate() {
-            let mut socket = None;
-            // Without a key nobody can say anything there.
-            let is_of_use = *spec != PortSpec::SEALED || opened.key.is_some();
-            // Where there are no pseudo-terminals, only one that is asked for by its name is an
-            // error.
-            let is_of_use = is_of_use
-                && (spec.transport != Transport::Terminal
-                    || terminal::EXIST
-                    || options.iter().any(|option| option.name == spec.name));
-            if let Some(address) = PortOption::place(options, spec, number).filter(|_| is_of_use) {
-                let failed = |error| OpenError { name: spec.name, address, why: Why::Failed(error) };
-                if spec.signed && !address.ip().is_loopback() && opened.key.is_none() {
-                    return Err(OpenError { name: spec.name, address, why: Why::NoKey });
-                }
-                let place = match spec.transport {
-                    Transport::Udp => {
-                        socket = Some(UdpSocket::bind(address).map_err(failed)?);
-                        socket.as_ref().map_or(Ok(address), UdpSocket::local_addr).map_err(failed)?
-                    }
-                    Transport::UdpTo => {
-                        let from = if address.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
-                        socket = Some(UdpSocket::bind((from, 0)).map_err(failed)?);
-                        events.offer(Client { port, address }, Heard::Opened);
-                        address
-                    }
-                    Transport::Tcp => {
-                        let listener = TcpListener::bind(address).map_err(failed)?;
-                        let place = listener.local_addr().map_err(failed)?;
-                        let (connections, events) = (Arc::clone(&connections), events.clone());
-                        std::thread::spawn(move || connections.accept(port, &listener, &events));
-                        place
-                    }
-                    Transport::Terminal => {
-                        let name = terminal::open(Client { port, address }, &connections, &events).map_err(failed)?;
-                        opened.terminals.push((spec, name));
+            let is_named = options.iter().any(|option| option.name == spec.name);
+            let socket = match PortOption::place(options, spec, number).filter(|_| opened.is_of_use(spec, is_named)) {
+                None => None,
+                Some(address) => {
+                    opened.may_open(spec, address).map_err(|why| OpenError { name: spec.name, address, why })?;
+                    if opened.is_without_the_key(spec) {
+                        opened.missed.push(OpenError { name: spec.name, address, why: Why::Unsigned });
                         opened.sockets.push(None);
                         continue;
                     }
-                    // Served for all vehicles together.
-                    Transport::Page => address,
-                };
-                if let Some(socket) = &socket {
-                    let (socket, events) = (socket.try_clone().map_err(failed)?, events.clone());
-                    socket.set_read_timeout(Some(POLL)).map_err(failed)?;
-                    std::thread::spawn(move || receive(port, &socket, &events));
+                    match opened.open_one(port, spec, address) {
+                        Ok(socket) => socket,
+                        Err(error) => {
+                            let error = OpenError { name: spec.name, address, why: Why::Failed(error) };
+                            if is_named {
+                                return Err(error);
+                            }
+                            opened.missed.push(error);
+                            None
+                        }
+                    }
                 }
-                opened.places.push((spec, place));
-            }
+            };
             opened.sockets.push(socket);
         }
         Ok(opened)
+    }
+
+    /// Is there anything to be said at this port?
+    fn is_of_use(&self, spec: &PortSpec, is_named: bool) -> bool {
+        // What cannot be said, a port that is there when it is wanted, one that cannot ask for the key, a kind of port that this system does not
+        // have: a word is said of those that are named.
+        (*spec != PortSpec::SEALED || self.key.is_some())
+            && (is_named || !spec.when_named)
+            && (is_named || !self.is_without_the_key(spec))
+            && (is_named || spec.transport != Transport::Terminal || terminal::EXIST)
+    }
+
+    fn may_open(&self, spec: &PortSpec, address: SocketAddr) -> Result<(), Why> {
+        let is_public = !address.ip().is_loopback() && spec.transport != Transport::Terminal;
+        match spec.guard {
+            Guard::Loopback if is_public => Err(Why::Loopback),
+            Guard::Key | Guard::Secret if is_public && self.key.is_none() => Err(Why::NoKey),
+            _ => Ok(()),
+        }
+    }
+
+    /// Is the key asked for everywhere, and can this port not ask for it? A pseudo-terminal belongs to the account that has made it.
+    fn is_without_the_key(&self, spec: &PortSpec) -> bool {
+        let has_room = spec.guard != Guard::Loopback || spec.transport == Transport::Terminal;
+        !has_room && self.key.as_ref().is_some_and(Key::is_everywhere)
+    }
+
+    /// Opens this one. Returns its socket, if it is one of datagrams.
+    fn open_one(
+        &mut self,
+        port: usize,
+        spec: &'static PortSpec,
+        address: SocketAddr,
+    ) -> std::io::Result<Option<UdpSocket>> {
+        let (connections, events) = (Arc::clone(&self.connections), self.events.clone());
+        let socket = match spec.transport {
+            Transport::Udp => Some(UdpSocket::bind(address)?),
+            Transport::UdpTo => {
+                let from = if address.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
+                let socket = UdpSocket::bind((from, 0))?;
+                events.offer(Client { port, address }, Heard::Opened);
+                Some(socket)
+            }
+            Transport::Tcp => {
+                let listener = TcpListener::bind(address)?;
+                self.places.push((spec, listener.local_addr()?));
+                std::thread::spawn(move || connections.accept(port, spec, &listener, &events));
+                return Ok(None);
+            }
+            Transport::Terminal => {
+                let name = terminal::open(Client { port, address }, &connections, &events)?;
+                self.terminals.push((spec, name));
+                return Ok(None);
+            }
+            // Served for all vehicles together.
+            Transport::Page => None,
+        };
+        if let Some(socket) = &socket {
+            let socket = socket.try_clone()?;
+            socket.set_read_timeout(Some(POLL))?;
+            std::thread::spawn(move || receive(port, &socket, &events));
+        }
+        let place = match (spec.transport, &socket) {
+            (Transport::Udp, Some(socket)) => socket.local_addr()?,
+            _ => address,
+        };
+        self.places.push((spec, place));
+        Ok(socket)
+    }
+
+    /// Those that another program has, or the system refuses. They were not asked for by name.
+    #[must_use]
+    pub fn missed(&self) -> &[OpenError] {
+        &self.missed
+    }
+
+    /// Calls this for every connection that is ended because it does not speak its port's language.
+    pub fn tell(&self, told: impl Fn(Ended) + Send + Sync + 'static) {
+        self.connections.tell(Box::new(told));
+    }
+
+    /// Connections that were ended because they do not speak the language of their port.
+    #[must_use]
+    pub fn ended(&self) -> u64 {
+        self.connections.ended()
     }
 
     /// Where each port is that is open.
     #[must_use]
     pub fn places(&self) -> &[(&'static PortSpec, SocketAddr)] {
         &self.places
+    }
+
+    /// What the page's address ends with, where others could open it otherwise.
+    #[must_use]
+    pub fn page_secret(&self) -> Option<String> {
+        let (_, address) = self.places.iter().find(|(spec, _)| spec.transport == Transport::Page)?;
+        let key = self.key.as_ref().filter(|key| key.is_everywhere() || !address.ip().is_loopback())?;
+        Some(key.page_secret())
     }
 
     /// The name of each port that is a pseudo-terminal.
@@ -226,6 +315,9 @@ impl Ports for OpenPorts {
             for (address, bytes) in page.take() {
                 hear(Client { port: *port, address }, Heard::Bytes(&bytes));
             }
+            for address in page.gone() {
+                hear(Client { port: *port, address }, Heard::Closed);
+            }
         }
         let heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..HEARD {
@@ -250,6 +342,12 @@ impl Ports for OpenPorts {
             page.deliver(to.address, bytes);
         } else {
             self.connections.send(to, bytes);
+        }
+    }
+
+    fn tell(&self, text: &str) {
+        if let Some((_, page)) = &self.page {
+            page.tell(text);
         }
     }
 

@@ -66,7 +66,8 @@ pub fn ask(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) -> Value
     for _ in 0..TRIES {
         socket.send(Message::text(what.to_string())).expect("sent");
         answer = next(socket, "reply", |reply| reply["id"] == id);
-        if answer["text"] != "the vehicle does not answer" {
+        let text = answer["text"].as_str().unwrap_or_default();
+        if text != "the vehicle does not answer" && !text.starts_with("expired") {
             break;
         }
     }

@@ -17,6 +17,8 @@ const SOON: Duration = Duration::from_secs(20);
 fn key(folder: &Path, name: &str, first: u8) -> String {
     let file = folder.join(name);
     std::fs::write(&file, format!("{first:02x}{}\n", "5a".repeat(31))).expect("the folder can be written");
+    #[cfg(unix)]
+    std::fs::set_permissions(&file, std::os::unix::fs::PermissionsExt::from_mode(0o600)).expect("it is ours");
     file.display().to_string()
 }
 

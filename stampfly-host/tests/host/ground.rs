@@ -4,11 +4,11 @@ use crate::connect::{message, page};
 use serde_json::{Value, json};
 use stampfly_board::simulation::StampFly;
 use stampfly_board::topics::Id;
-use stampfly_host::ground::{Event, Hub, Limits, Reply, Server, VehicleCard, ask::NAMES};
+use stampfly_host::ground::{self, Event, Hub, Limits, LogSoFar, Reply, Server, VehicleCard, ask::NAMES};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Instant, Message as _};
-use std::io::{Read, Write};
+use std::io::{Cursor, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant as Wall};
@@ -39,6 +39,16 @@ fn say(address: SocketAddr, text: &str) -> String {
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).expect("an answer");
     String::from_utf8_lossy(&answer).into_owned()
+}
+
+/// What it says at first, where it does not close.
+fn say_for(address: SocketAddr, text: &str, time: Duration) -> String {
+    let mut stream = connect(address);
+    stream.set_read_timeout(Some(time)).expect("a timeout");
+    stream.write_all(text.as_bytes()).expect("sent");
+    let mut answer = [0; 64];
+    let length = stream.read(&mut answer).unwrap_or_default();
+    String::from_utf8_lossy(&answer[..length]).into_owned()
 }
 
 fn get(address: SocketAddr, path: &str) -> String {
@@ -83,7 +93,9 @@ fn a_log_is_what_the_flight_provides() {
     assert!(get(server.address(), "/log/0").starts_with("HTTP/1.1 404"), "no log yet");
     let log: Vec<u8> = (0..=255).cycle().take(3_000_000).collect();
     let provided = log.clone();
-    hub.provide_log(0, move || provided.clone());
+    hub.provide_log(0, move || {
+        Ok(LogSoFar { length: provided.len() as u64, bytes: Box::new(Cursor::new(provided.clone())) })
+    });
     let mut stream = connect(server.address());
     write!(stream, "GET /log/0 HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("sent");
     let mut answer = Vec::new();
@@ -112,13 +124,73 @@ fn what_is_foreign_slow_or_too_much_is_refused() {
     let long = format!("GET / HTTP/1.1\r\nHost: localhost\r\nX: {}\r\n\r\n", "x".repeat(20_000));
     assert!(say(address, &long).starts_with("HTTP/1.1 431 "));
 
-    let waiting: Vec<_> = (0..16).map(|_| socket(address)).collect();
-    assert!(get(address, "/").starts_with("HTTP/1.1 503 "));
-    drop(waiting);
+    let open: Vec<_> = (0..Limits::default().sockets).map(|_| socket(address)).collect();
+    assert!(say(address, &handshake()).starts_with("HTTP/1.1 503 "), "one more is refused");
+    assert!(get(address, "/").starts_with("HTTP/1.1 200 "), "the page is shown");
+    drop(open);
     let until = Wall::now() + SOON;
-    while !get(address, "/").starts_with("HTTP/1.1 200 ") {
+    while say_for(address, &handshake(), Duration::from_millis(100)).starts_with("HTTP/1.1 503 ") {
         assert!(Wall::now() < until, "places are free again");
     }
+}
+
+/// A request for a WebSocket, as RFC 6455 has it.
+fn handshake() -> String {
+    let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    let asks = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13";
+    format!("GET /ws HTTP/1.1\r\nHost: localhost\r\n{asks}\r\n{key}\r\n\r\n")
+}
+
+#[test]
+fn half_requests_and_logs_that_are_read_slowly_do_not_keep_a_person_out() {
+    let hub = hub();
+    let limits = Limits { stall: Duration::from_secs(2), slowest: 10_000_000, ..Limits::default() };
+    let server = Server::start(hub.clone(), "127.0.0.1:0".parse().expect("an address"), limits).expect("a free port");
+    let length = 50_000_000;
+    hub.provide_log(0, move || Ok(LogSoFar { length, bytes: Box::new(std::io::repeat(7).take(length)) }));
+    let address = server.address();
+    let ask = |text: &str| {
+        let mut stream = connect(address);
+        stream.write_all(text.as_bytes()).expect("sent");
+        stream
+    };
+    let mut slow: Vec<_> = (0..limits.logs).map(|_| ask("GET /log/0 HTTP/1.1\r\nHost: localhost\r\n\r\n")).collect();
+    let until = Wall::now() + SOON;
+    let first = |address| say_for(address, "GET /log/0 HTTP/1.1\r\nHost: localhost\r\n\r\n", SOON);
+    while !first(address).starts_with("HTTP/1.1 503 ") {
+        assert!(Wall::now() < until, "as many logs as there are places");
+    }
+    let _half: Vec<_> = (0..5 * limits.requests).map(|_| ask("GET / HTTP/1.1\r\nHost: loc")).collect();
+    for _ in 0..3 {
+        assert!(get(address, "/").starts_with("HTTP/1.1 200 "));
+        next(&mut socket(address), "state");
+    }
+    // Who reads a little now and then keeps no place either.
+    let until = Wall::now() + SOON;
+    let mut part = [0; 4096];
+    while first(address).starts_with("HTTP/1.1 503 ") {
+        assert!(Wall::now() < until, "they keep their places");
+        slow.iter_mut().for_each(|stream| assert!(stream.read(&mut part).is_ok()));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn a_page_with_a_secret_is_for_those_who_know_it() {
+    let (hub, limits) = (hub(), Limits::default());
+    hub.provide_log(0, || Ok(LogSoFar { length: 4, bytes: Box::new(Cursor::new(*b"ULog")) }));
+    let listen = "127.0.0.1:0".parse().expect("an address");
+    let server = Server::with_secret(hub, listen, limits, Some("aB3".into())).expect("a free port");
+    let address = server.address();
+    assert!(get(address, "/").starts_with("HTTP/1.1 200 "), "it shows nothing by itself");
+    for wrong in ["", "?secret=aB4", "?secret=aB", "?secret=aB33"] {
+        assert!(get(address, &format!("/log/0{wrong}")).starts_with("HTTP/1.1 403 "), "{wrong}");
+        let handshake = handshake().replace("/ws", &format!("/ws{wrong}"));
+        assert!(say(address, &handshake).starts_with("HTTP/1.1 403 "), "{wrong}");
+    }
+    assert!(get(address, "/log/0?secret=aB3").ends_with("ULog"));
+    let handshake = handshake().replace("/ws", "/ws?secret=aB3");
+    assert!(say_for(address, &handshake, Duration::from_millis(500)).starts_with("HTTP/1.1 101 "));
 }
 
 #[test]
@@ -145,7 +217,7 @@ fn a_page_sees_state_and_gets_its_answers() {
     send(&mut page, &json!({ "vehicle": 1, "id": 2, "do": "guided", "kind": "arm" }));
     let until = Wall::now() + SOON;
     let asks = loop {
-        let asks = hub.asks(1);
+        let asks = hub.asks(1, ground::now());
         if !asks.is_empty() {
             break asks;
         }

@@ -17,6 +17,8 @@ use stampfly_types::Instant;
 const TICK_US: u64 = 10;
 /// Largest time: 48 bits.
 const LATEST: u64 = (1 << 48) - 1;
+/// Nothing later is believed: half of all times, in the year 2059. A sender whose clock is at the end of all times would leave none for others.
+const AHEAD: u64 = LATEST / 2;
 /// A new sender's time may be so much before the receiver's own: a minute, as the protocol's guide says.
 const OLD: u64 = 60_000_000 / TICK_US;
 /// Senders on all links together that are remembered.
@@ -37,6 +39,12 @@ impl SigningKey {
     #[must_use]
     pub fn from_passphrase(text: &str) -> Self {
         Self(Sha256::digest(text.as_bytes()).into())
+    }
+
+    /// The key of a vehicle's stations that speak MAVLink: that of the [phrase](crate::secure::Key::phrase) of its own key.
+    #[must_use]
+    pub fn of(key: &crate::secure::Key) -> Self {
+        Self::from_passphrase(&key.phrase())
     }
 
     fn digest(&self, signed: &[u8], link: u8, time: u64) -> [u8; 6] {
@@ -88,6 +96,12 @@ impl Signer {
         self.time
     }
 
+    /// Signs with later times than this one from now on: the largest that was believed. A station whose clock is behind another's takes over the
+    /// vehicle's time, so the vehicle must not tell an earlier one than it asks for.
+    pub fn not_before(&mut self, time: u64) {
+        self.time = self.time.max(time);
+    }
+
     pub(super) fn sign(&mut self, now: Instant, frame: &[u8]) -> Signature {
         let clock = time(self.epoch, now);
         self.time = clock.max(self.time.saturating_add(1)).min(LATEST);
@@ -105,6 +119,8 @@ pub enum Untrusted {
     WrongSignature,
     /// It was sent before, or long ago.
     Old,
+    /// Its time leaves too few later ones.
+    Ahead,
     /// There are too many senders.
     TooManySenders,
 }
@@ -115,6 +131,7 @@ impl fmt::Display for Untrusted {
             Self::Unsigned => "it is not signed",
             Self::WrongSignature => "the signature is not of this key",
             Self::Old => "it is older than the last one",
+            Self::Ahead => "its time is too far ahead",
             Self::TooManySenders => "there are too many senders",
         })
     }
@@ -176,6 +193,9 @@ impl Verifier {
         let difference = digest.iter().zip(signature.digest).fold(0, |sum, (a, b)| sum | (a ^ b));
         if core::hint::black_box(difference) != 0 {
             return Err(Untrusted::WrongSignature);
+        }
+        if signature.time > AHEAD {
+            return Err(Untrusted::Ahead);
         }
         let sender = (frame.system, frame.component, signature.link);
         let row = self.senders.iter_mut().find(|(system, component, link, _)| (*system, *component, *link) == sender);

@@ -14,6 +14,9 @@ const BEFORE: &str = "stampfly://key?id=";
 const KEY_WORD: &str = "&key=";
 const SUM_WORD: &str = "&sum=";
 
+/// What is signed in MAVLink is signed with a key that is made for it.
+const MAVLINK: &[u8; 16] = b"stampfly-mavlink";
+
 /// Why something is no key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -112,6 +115,31 @@ impl Key {
     #[must_use]
     pub const fn bytes(&self) -> &[u8; KEY] {
         self.bytes.bytes()
+    }
+
+    /// A key for one other purpose: who knows it knows neither this one nor that of another purpose.
+    ///
+    /// ```
+    /// use stampfly_link::secure::Key;
+    /// # let key = Key::generate(7, core::array::from_fn(|place| place as u8))?;
+    /// assert_ne!(key.purpose(b"a page's address"), key.purpose(b"signs of MAVLink"));
+    /// # Ok::<(), stampfly_link::secure::KeyError>(())
+    /// ```
+    #[must_use]
+    pub fn purpose(&self, label: &[u8; 16]) -> [u8; KEY] {
+        *self.bytes.derive(*label).bytes()
+    }
+
+    /// The pass-phrase of stations that speak MAVLink: 64 digits, to be typed or pasted where a ground station asks for one. Who knows it can
+    /// [sign](crate::mavlink::signing) and not seal.
+    #[must_use]
+    pub fn phrase(&self) -> heapless::String<{ 2 * KEY }> {
+        let mut phrase = heapless::String::new();
+        // There is room for all of it.
+        for byte in self.purpose(MAVLINK) {
+            _ = fmt::write(&mut phrase, format_args!("{byte:02x}"));
+        }
+        phrase
     }
 
     pub(super) const fn secret(&self) -> &Secret {

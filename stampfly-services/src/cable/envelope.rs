@@ -8,8 +8,9 @@
 //! | 0 | u16 | [fingerprint] of the vehicle's tables: another one's places mean something else |
 //! | 2 | u16 | number of the question, which its answer repeats; of samples, of the sample |
 //! | 4 | u8 | kind, as in [`Payload`] |
-//! | 5 | u8 | place of this part from 0; bit 7 is set in the last |
-//! | 6 | … | body, as its kind has it; a longer one goes on in the next part |
+//! | 5 | u8 | place of this part from 0; bit 7 is set in the last, bit 6 where it says when |
+//! | 6 | u32 | with bit 6: when it was said, by the vehicle's clock, ms |
+//! | 6 or 10 | … | body, as its kind has it; a longer one goes on in the next part |
 //!
 //! `payload_type` is [`TYPE`], among those that anybody may use. Little-endian, at most 128 bytes.
 
@@ -24,12 +25,15 @@ pub const TYPE: u16 = 0xF1F5;
 pub const TUNNEL: usize = 128;
 const HEADER: usize = 6;
 /// Bytes of a body in one part.
-pub const PART: usize = TUNNEL - HEADER;
+pub const PART: usize = TUNNEL - HEADER - DATE;
 /// Parts of a body, at most.
 const PARTS: usize = 3;
 /// Bytes of a body.
 pub const BODY: usize = PARTS * PART;
 const LAST: u8 = 0x80;
+const DATED: u8 = 0x40;
+/// Bytes of an instant.
+const DATE: usize = 4;
 
 /// Two ends that mean the same by the places of topics and parameters have the same.
 #[must_use]
@@ -57,6 +61,8 @@ pub struct Envelope {
     pub number: u16,
     /// What the body is.
     pub kind: Kind,
+    /// When a station has said it, by the vehicle's clock as far as it knows that, ms. A vehicle says nothing of it.
+    pub said: Option<u32>,
     /// Which part.
     place: u8,
     is_last: bool,
@@ -64,7 +70,13 @@ pub struct Envelope {
 
 impl Envelope {
     /// Hands every part of a payload to `put`. A value that must not be used is not sent: `false`.
-    pub fn write(table: u16, number: u16, payload: &Payload<'_>, put: &mut dyn FnMut(&[u8])) -> bool {
+    pub fn write(
+        table: u16,
+        number: u16,
+        said: Option<u32>,
+        payload: &Payload<'_>,
+        put: &mut dyn FnMut(&[u8]),
+    ) -> bool {
         let mut body = [0; BODY];
         let Ok(length) = payload.encode(&mut body) else { return false };
         let mut rest = body.get(..length).unwrap_or_default();
@@ -72,10 +84,12 @@ impl Envelope {
             let (part, more) = rest.split_at_checked(PART).unwrap_or((rest, &[]));
             rest = more;
             let last = if rest.is_empty() { LAST } else { 0 };
+            let dated = if said.is_some() { DATED } else { 0 };
             let ([t0, t1], [n0, n1]) = (table.to_le_bytes(), number.to_le_bytes());
             let mut bytes = Vec::<u8, TUNNEL>::new();
-            // There is room for both.
-            _ = bytes.extend_from_slice(&[t0, t1, n0, n1, payload.kind() as u8, place | last]);
+            // There is room for all of it.
+            _ = bytes.extend_from_slice(&[t0, t1, n0, n1, payload.kind() as u8, place | last | dated]);
+            _ = said.is_none_or(|said| bytes.extend_from_slice(&said.to_le_bytes()).is_ok());
             _ = bytes.extend_from_slice(part);
             put(&bytes);
             if rest.is_empty() {
@@ -91,8 +105,15 @@ impl Envelope {
         let (&[t0, t1, n0, n1, kind, part], body) = bytes.split_first_chunk::<HEADER>()?;
         let kind = Kind::ALL.into_iter().find(|known| *known as u8 == kind)?;
         let (table, number) = (u16::from_le_bytes([t0, t1]), u16::from_le_bytes([n0, n1]));
-        let (place, is_last) = (part & !LAST, part & LAST != 0);
-        (body.len() <= PART).then_some((Self { table, number, kind, place, is_last }, body))
+        let (place, is_last) = (part & !(LAST | DATED), part & LAST != 0);
+        let (said, body) = match part & DATED {
+            0 => (None, body),
+            _ => {
+                let (said, body) = body.split_first_chunk::<DATE>()?;
+                (Some(u32::from_le_bytes(*said)), body)
+            }
+        };
+        (body.len() <= PART).then_some((Self { table, number, kind, said, place, is_last }, body))
     }
 }
 
@@ -104,7 +125,7 @@ impl Envelope {
 /// let text = "a".repeat(150);
 /// let (mut assembly, mut heard) = (Assembly::default(), 0);
 /// let said = Payload::Reply { text: &text, last: true };
-/// Envelope::write(7, 1, &said, &mut |part| {
+/// Envelope::write(7, 1, None, &said, &mut |part| {
 ///     if let Some((envelope, payload)) = assembly.feed(part) {
 ///         assert_eq!((envelope.table, envelope.number, payload), (7, 1, said));
 ///         heard += 1;

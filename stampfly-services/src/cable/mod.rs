@@ -17,6 +17,7 @@ pub use envelope::{Assembly, BODY, Envelope, PART, TUNNEL, TYPE, fingerprint};
 pub use split::{PAUSE, Part, Split};
 
 use crate::cockpit::Cockpit;
+use crate::deed::{Deed, Waited};
 use crate::desk::{Answer, Desk, Room};
 use crate::mavlink::{Identity, Mavlink};
 use crate::refusal::Seat;
@@ -34,6 +35,22 @@ const AT_ONCE: usize = 4;
 /// Words of the longest message that is sent.
 const WORDS: usize = 64;
 
+/// Commands that wait to be seen. More are acknowledged when they are taken.
+const WAITS: usize = 4;
+/// What is older is not done: a line that was held up brings no command afterwards.
+const FRESH_MS: i32 = 1_000;
+const LATE: &str = "expired: it came more than a second late, and was not done";
+
+/// Was this said too long ago? What seems to be said in the future is not: a station counts on while a simulated vehicle's time is slower.
+const fn is_late(now: Instant, said: u32) -> bool {
+    ((now.as_micros() / 1_000) as u32).wrapping_sub(said) as i32 > FRESH_MS
+}
+
+/// What ends a flight is done whatever its age.
+fn is_never_late(payload: &Payload<'_>) -> bool {
+    payload.is_kill() || payload.command().is_some_and(|command| command.kind == GuidedKind::Land)
+}
+
 /// Where frames go. Each is handed over whole.
 pub type Put<'p> = &'p mut dyn FnMut(&[u8]);
 
@@ -48,9 +65,11 @@ pub struct Cable<const WATCHED: usize, const ITEMS: usize = { crate::mavlink::IT
     desk: Desk,
     watches: Watches<WATCHED>,
     table: u16,
-    /// When the station was heard, and its system.
-    station: Option<(Instant, u8)>,
+    /// When the station was heard.
+    station: Option<Instant>,
     foreign: u32,
+    /// Numbers of commands that are not seen to have happened yet.
+    waits: heapless::Vec<(u16, Waited), WAITS>,
     /// Chunks of the flight record that were sent.
     chunks: u16,
 }
@@ -67,6 +86,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             table,
             station: None,
             foreign: 0,
+            waits: heapless::Vec::new(),
             chunks: 0,
         }
     }
@@ -80,7 +100,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     /// Does a program speak in frames here?
     #[must_use]
     pub fn is_spoken(&self, now: Instant) -> bool {
-        self.station.is_some_and(|(at, _)| now.since(at) < SILENCE)
+        self.station.is_some_and(|at| now.since(at) < SILENCE)
     }
 
     /// Takes what has come. `typed` is given what a person has typed.
@@ -92,6 +112,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         put: Put<'_>,
         typed: &mut dyn FnMut(u8),
     ) {
+        // Its frames come byte by byte.
+        self.mavlink.open_local(now, (), false);
         for byte in bytes {
             if self.split.feed(now, *byte) == Part::Text {
                 typed(*byte);
@@ -99,21 +121,21 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             }
             // A byte ends one frame at most.
             let mut tunnel = None;
-            let mut keep = |system: u8, heard: Tunnel| tunnel = Some((system, heard));
+            let mut keep = |seat: Seat, heard: Tunnel| tunnel = Some((seat, heard));
             self.mavlink.hear_tunnels(now, (), &[*byte], cockpit, &mut |(), frame| put(frame), &mut keep);
-            if let Some((system, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
-                self.open(now, system, &tunnel.bytes, cockpit, put);
+            if let Some((seat, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
+                self.open(now, seat, &tunnel.bytes, cockpit, put);
             }
         }
     }
 
     /// Opens an envelope.
-    fn open(&mut self, now: Instant, system: u8, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) {
+    fn open(&mut self, now: Instant, seat: Seat, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) {
         // What a station says is short: one part.
         let Some((envelope, body)) = Envelope::read(bytes) else { return };
         let Some(payload) = Payload::decode(envelope.kind, body) else { return };
-        self.station = Some((now, system));
-        let (seat, number) = (Seat::Mavlink(system), envelope.number);
+        self.station = Some(now);
+        let number = envelope.number;
         if envelope.table != self.table && !payload.is_kill() {
             self.foreign = self.foreign.wrapping_add(1);
             return self.say(
@@ -121,6 +143,15 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
                 &Payload::Reply { text: "station and vehicle are of different versions", last: true },
                 put,
             );
+        }
+        if envelope.said.is_some_and(|said| is_late(now, said)) && !is_never_late(&payload) {
+            // What comes again and again is not answered.
+            let is_repeated = matches!(payload, Payload::Sticks(_) | Payload::Watch { .. } | Payload::Record { .. })
+                || payload.command().is_some_and(|command| command.kind == GuidedKind::None);
+            if !is_repeated {
+                self.say(number, &Payload::Reply { text: LATE, last: true }, put);
+            }
+            return;
         }
         let command = match payload {
             Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return cockpit.alive(now, seat),
@@ -143,19 +174,49 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
                 }
             },
         };
+        let deed = Deed::of(command.kind);
+        let mut words = heapless::String::<96>::new();
+        if deed.is_some_and(|deed| deed.refuse(&cockpit.view().state(), &mut words)) {
+            return self.say(number, &Payload::Reply { text: &words, last: true }, put);
+        }
+        let waited = deed.map(|deed| Waited::new(now, deed, cockpit));
         match cockpit.guide(now, seat, command) {
+            // Acknowledged when it is seen to have happened.
+            Ok(()) if let Some(waited) = waited.filter(|_| !self.waits.is_full()) => {
+                // There is room.
+                _ = self.waits.push((number, waited));
+            }
             Ok(()) => self.say(number, &Payload::Acknowledgement { counter: number.into(), taken: true }, put),
             Err(refusal) => {
-                let mut words = heapless::String::<96>::new();
                 _ = core::fmt::Write::write_fmt(&mut words, format_args!("{refusal}"));
                 self.say(number, &Payload::Reply { text: &words, last: true }, put);
             }
         }
     }
 
+    /// Acknowledges commands that are seen to have happened, and says of others why they did not.
+    fn settle(&mut self, now: Instant, cockpit: &dyn Cockpit, put: Put<'_>) {
+        let Self { waits, mavlink, table, .. } = self;
+        waits.retain(|(number, waited)| {
+            let Some(result) = waited.look(now, cockpit) else { return true };
+            let payload = match result {
+                Ok(()) => Payload::Acknowledgement { counter: (*number).into(), taken: true },
+                Err(text) => Payload::Reply { text, last: true },
+            };
+            send(mavlink, *table, *number, &payload, put);
+            false
+        });
+    }
+
+    /// The line is gone, with all who command over it.
+    pub fn close(&mut self, cockpit: &mut dyn Cockpit) {
+        self.mavlink.close((), cockpit);
+    }
+
     /// Sends what is due: MAVLink's streams fifty times a second at most, and the station's topics.
     pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, samples: &dyn Samples, put: Put<'_>) {
         self.mavlink.poll(now, cockpit, &mut |(), frame| put(frame));
+        self.settle(now, cockpit, put);
         if !self.is_spoken(now) {
             self.watches.clear();
             self.desk.clear();
@@ -211,7 +272,7 @@ fn send<const ITEMS: usize>(
     payload: &Payload<'_>,
     put: Put<'_>,
 ) {
-    Envelope::write(table, number, payload, &mut |part| {
+    Envelope::write(table, number, None, payload, &mut |part| {
         if let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) {
             mavlink.send_payload((), Tunnel::ID, &tunnel.payload(), &mut |(), frame| put(frame));
         }

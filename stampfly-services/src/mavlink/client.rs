@@ -6,6 +6,7 @@ use super::said::Said;
 use super::streams::STREAMS;
 use super::unreadable::Unreadable;
 use super::unserved::Told;
+use crate::refusal::Connection;
 use crate::view::View;
 use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity, STATUSTEXT_DATA};
 use stampfly_link::mavlink::signing::{Signer, SigningKey, Untrusted, Verifier};
@@ -35,10 +36,12 @@ pub(super) enum Fed {
     /// A message of this system and component that the dialect cannot read, but that wants an
     /// answer.
     Unreadable([u8; 2], Unreadable),
-    /// Bytes of another protocol, of this system.
-    Tunnel(u8, Tunnel),
+    /// Bytes of another protocol, of this system and component.
+    Tunnel([u8; 2], Tunnel),
     /// A frame that is not signed as it must be.
     Untrusted(Untrusted),
+    /// A frame of the vehicle's own.
+    Own,
 }
 
 /// Who may be believed, when frames must be signed.
@@ -54,6 +57,8 @@ pub(super) struct Guard {
 #[derive(Clone, Debug)]
 pub(super) struct Client<C> {
     pub id: C,
+    /// The number of its connection, once it has said something.
+    pub connection: Option<Connection>,
     pub heard: Instant,
     /// It is sent to although it says nothing.
     pub stays: bool,
@@ -81,6 +86,7 @@ impl<C> Client<C> {
         let due = STREAMS.map(|stream| Due { every: stream.every, next: now });
         Self {
             id,
+            connection: None,
             heard: now,
             stays,
             believed: false,
@@ -96,9 +102,12 @@ impl<C> Client<C> {
         }
     }
 
-    /// What is said from now on is said at this instant.
-    pub const fn at(&mut self, now: Instant) {
+    /// What is said from now on is said at this instant, and signed later than what was believed.
+    pub fn at(&mut self, now: Instant, guard: Option<&Guard>) {
         self.now = now;
+        if let Some((signer, guard)) = self.signer.as_mut().zip(guard) {
+            signer.not_before(guard.verifier.time());
+        }
     }
 
     /// The second in which something is said.
@@ -126,8 +135,12 @@ impl<C> Client<C> {
     }
 
     /// Takes a byte. Returns the message that it ends. What is no message of the dialect and wants no answer is passed over.
-    pub fn feed(&mut self, byte: u8, guard: Option<&mut Guard>) -> Option<Fed> {
+    pub fn feed(&mut self, byte: u8, own: u8, guard: Option<&mut Guard>) -> Option<Fed> {
         let frame = self.decoder.feed(byte)?;
+        // What the vehicle itself has said, and signed, comes back from a router, or from one who has no key of his own.
+        if [frame.system, frame.component] == [own, AUTOPILOT] {
+            return Some(Fed::Own);
+        }
         if self.signer.is_some() {
             let judged = guard.map_or(Err(Untrusted::Unsigned), |guard| guard.verifier.verify(&frame));
             if let Err(why) = judged {
@@ -135,12 +148,13 @@ impl<C> Client<C> {
             }
         }
         (self.believed, self.heard) = (true, self.now);
+        let sender = [frame.system, frame.component];
         if frame.id == Tunnel::ID {
-            return Some(Fed::Tunnel(frame.system, Tunnel::read(frame.payload)?));
+            return Some(Fed::Tunnel(sender, Tunnel::read(frame.payload)?));
         }
         Some(match Heard::read(&frame)? {
-            Ok(message) => Fed::Message([frame.system, frame.component], message),
-            Err(message) => Fed::Unreadable([frame.system, frame.component], message),
+            Ok(message) => Fed::Message(sender, message),
+            Err(message) => Fed::Unreadable(sender, message),
         })
     }
 

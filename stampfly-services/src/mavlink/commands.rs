@@ -1,6 +1,6 @@
 //! Commands, and what becomes of each.
 //!
-//! What changes the vehicle's state is acknowledged when it [has happened](super::orders); arming
+//! What changes the vehicle's state is acknowledged when it [has happened](crate::deed); arming
 //! that would be refused is denied at once, with the reasons as texts. What a program may ask for
 //! while another one commands is the [lease](crate::lease)'s decision, acknowledged as
 //! `NOT_IN_CONTROL`.
@@ -10,10 +10,11 @@ use super::client::{Client, Put};
 use super::identity::Own;
 use super::leading::Leading;
 use super::missions::Missions;
-use super::orders::{Asked, Deed, Orders, Rise, say, take_off};
+use super::orders::{Asked, Orders, Rise, say, take_off};
 use super::streams::{STREAMS, make, text};
 use super::unserved::Unserved;
 use crate::cockpit::{Cockpit, Request};
+use crate::deed::Deed;
 use crate::refusal::{Refusal, Seat};
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;

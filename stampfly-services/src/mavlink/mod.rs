@@ -61,9 +61,9 @@ use missions::Missions;
 use orders::Orders;
 pub use parameters::short_name;
 use said::Said;
-use stampfly_link::mavlink::Tunnel;
-use stampfly_link::mavlink::dialects::common::MavSeverity;
+use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity};
 use stampfly_link::mavlink::signing::{self, SigningKey, Untrusted, Verifier};
+use stampfly_link::mavlink::{MavlinkDecoder, Tunnel};
 use stampfly_types::{Duration, Instant};
 
 /// Clients that can be connected at once.
@@ -94,6 +94,8 @@ pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions:
     leading: Leading<C>,
     notices: streams::Notices,
     guard: Option<Guard>,
+    /// What was asked of the vehicle, and told.
+    asked: u32,
     refused: u32,
     untrusted: u32,
     /// How many stations have been told of, and when.
@@ -122,6 +124,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             leading: Leading::new(),
             notices: streams::Notices::new(),
             guard: None,
+            asked: 0,
             refused: 0,
             untrusted: 0,
             counted: (0, Instant::ZERO),
@@ -138,7 +141,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self
     }
 
-    /// Clients that were turned away because there were too many. Wraps around.
+    /// Clients that were turned away because there were too many, or because they do not speak MAVLink. Wraps around.
     #[must_use]
     pub const fn refused(&self) -> u32 {
         self.refused
@@ -194,8 +197,12 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         }
     }
 
-    /// Somebody is gone.
-    pub fn close(&mut self, client: C) {
+    /// A client is gone. What it commands it has left.
+    pub fn close(&mut self, client: C, cockpit: &mut dyn Cockpit) {
+        let gone = self.clients.iter().find(|known| known.id == client).and_then(|known| known.connection);
+        if let Some(connection) = gone {
+            cockpit.leave(&|seat| seat.is_at(connection));
+        }
         self.missions.forget(client);
         self.clients.retain(|known| known.id != client);
     }
@@ -205,7 +212,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self.hear_tunnels(now, from, bytes, cockpit, put, &mut |_, _| {});
     }
 
-    /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with the system that sent it.
+    /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with who has sent it.
     pub fn hear_tunnels(
         &mut self,
         now: Instant,
@@ -213,16 +220,45 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         bytes: &[u8],
         cockpit: &mut dyn Cockpit,
         put: Put<'_, C>,
-        tunnel: &mut dyn FnMut(u8, Tunnel),
+        tunnel: &mut dyn FnMut(Seat, Tunnel),
     ) {
-        self.open(now, from, false);
+        self.hear_any(now, from, self.guard.is_some(), bytes, cockpit, put, tunnel);
+    }
+
+    /// Takes what a client on the same machine has sent, who need not sign although others must, and answers.
+    pub fn hear_local(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        self.hear_any(now, from, false, bytes, cockpit, put, &mut |_, _| {});
+    }
+
+    // A client that is new has a guard, or need not sign.
+    #[allow(clippy::too_many_arguments, reason = "of one function with two names")]
+    fn hear_any(
+        &mut self,
+        now: Instant,
+        from: C,
+        guarded: bool,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_, C>,
+        tunnel: &mut dyn FnMut(Seat, Tunnel),
+    ) {
+        // A datagram holds whole frames. What begins otherwise is of no program that speaks MAVLink, and takes no place of one that does.
+        if !self.clients.iter().any(|known| known.id == from) {
+            if !begins_with_a_frame(bytes) {
+                self.refused = self.refused.wrapping_add(1);
+                return;
+            }
+            self.admit(now, from, false, guarded);
+        }
         self.own.origin = cockpit.origin().or(self.own.origin);
         let Self { own, clients, missions, calibrating, orders, leading, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
-        client.at(now);
+        client.at(now, guard.as_ref());
+        let connection = *client.connection.get_or_insert_with(|| cockpit.connection());
+        let seat = |[system, component]: [u8; 2]| Seat::Mavlink { connection, system, component };
         for byte in bytes {
-            let (asker, said) = match client.feed(*byte, guard.as_mut()) {
-                None => continue,
+            let (asker, said) = match client.feed(*byte, own.identity.system, guard.as_mut()) {
+                None | Some(Fed::Own) => continue,
                 Some(Fed::Untrusted(why)) => {
                     *untrusted = untrusted.wrapping_add(1);
                     // It has the key, and its clock is behind the vehicle's: stations take over the time of whatever is signed with their key. One that sends again what others have
@@ -236,9 +272,9 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                     }
                     continue;
                 }
-                Some(Fed::Tunnel(system, heard)) => {
+                Some(Fed::Tunnel(sender, heard)) => {
                     if own.is_meant(heard.target[0], heard.target[1]) {
-                        tunnel(system, heard);
+                        tunnel(seat(sender), heard);
                     }
                     continue;
                 }
@@ -254,7 +290,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 orders: &mut *orders,
                 leading: &mut *leading,
                 asker,
-                seat: Seat::Mavlink(asker[0]),
+                seat: seat(asker),
                 cockpit: &mut *cockpit,
                 put: &mut *put,
             };
@@ -278,19 +314,26 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self.own.origin = cockpit.origin().or(self.own.origin);
         let notices = self.notices.new_ones(&cockpit.view());
         let not_believed = self.not_believed(now);
+        let mut asked = Vec::<Said, 4>::new();
+        while let Some((number, told)) = cockpit.told(self.asked).filter(|_| !asked.is_full()) {
+            self.asked = number;
+            let mut words = heapless::String::<50>::new();
+            _ = write!(words, "{told}");
+            _ = asked.push(streams::text(MavSeverity::MAV_SEVERITY_INFO, "", &words));
+        }
         let mission = (now.since(self.told) >= TOLD).then(|| self.missions.state());
         if mission.is_some() {
             self.told = now;
         }
         for client in &mut self.clients {
-            client.at(now);
+            client.at(now, self.guard.as_ref());
             if !client.is_served() {
                 continue;
             }
             for notice in &notices {
                 client.send(&notice.text(), put);
             }
-            for said in not_believed.iter().chain(&mission) {
+            for said in not_believed.iter().chain(&mission).chain(&asked) {
                 client.send(said, put);
             }
             client.send_due(now, &self.own, &cockpit.view(), put);
@@ -315,4 +358,10 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         _ = write!(words, "{new} frames not signed with the key, ignored");
         Some(streams::text(MavSeverity::MAV_SEVERITY_WARNING, "", &words))
     }
+}
+
+/// Does a new client speak MAVLink? A place is for one that does.
+fn begins_with_a_frame(bytes: &[u8]) -> bool {
+    let mut decoder = MavlinkDecoder::<MavMessage>::new();
+    bytes.iter().any(|byte| decoder.feed(*byte).is_some()) && decoder.discarded() == 0
 }

@@ -1,117 +1,31 @@
 //! Commands that change the vehicle's state, each acknowledged when it is seen to have happened.
 //!
-//! A command that has reached the vehicle may still be refused by its mode machine, and what a
-//! program sends next depends on what the first has done. So the acknowledgement waits for the
-//! [state](crate::View::state) that the vehicle publishes, mostly one or two control cycles.
-//! Nothing is said meanwhile, because many programs take the first acknowledgement for the last
-//! one; a program that asks again meanwhile is told that it goes on, and the vehicle is not asked
-//! twice.
-//!
-//! | asked for | has happened when |
-//! |---|---|
-//! | arming | it is armed |
-//! | disarming, motors off | it is disarmed; in the air disarming lands first, and goes on meanwhile |
-//! | take-off | it rises or flies |
-//! | landing | it lands or is disarmed |
-//! | hold, return | a program has authority, and it does not land |
-//! | guided mode | the same, or it is disarmed: then the next arming by a program is guided |
-//!
-//! What has not happened after [`SOON`] has failed, with a text why.
+//! What a program sends next depends on what the first command has done. So the acknowledgement waits
+//! until the [deed](crate::deed) is seen. Nothing is said meanwhile, because many programs take the
+//! first acknowledgement for the last one; a program that asks again meanwhile is told that it goes
+//! on, and the vehicle is not asked twice.
 
 use super::client::{Client, Put};
 use super::commands::acknowledge;
 use crate::cockpit::Cockpit;
+use crate::deed::{Deed, NOT_NOW, SOON, refusals, why_not};
 use crate::mission::Runner;
 use crate::refusal::Seat;
 use core::fmt::{self, Write};
 use heapless::{String, Vec};
 use stampfly_link::mavlink::dialects::common::{MavResult, MavSeverity};
-use stampfly_types::messages::{CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{FlightPhase, GuidedCommand};
 use stampfly_types::{Duration, Instant, Vec3};
 
 /// Commands that are waited for at once. A program that asks for more is told to try later, unless
 /// it ends a flight.
 const AT_ONCE: usize = 3;
-/// A vehicle that has not done it after this long does not. Programs send a command again after
-/// half a second, and three times in all.
-const SOON: Duration = Duration::from_millis(1_500);
 /// No landing takes longer.
 const LANDING: Duration = Duration::from_secs(60);
 /// Between two acknowledgements that it goes on.
 const AGAIN: Duration = Duration::from_millis(500);
-/// The vehicle's state says no more.
-const NOT_NOW: &str = "the vehicle does not do it now";
 /// How far it is, is not known.
 const UNKNOWN: u8 = u8::MAX;
-
-/// What a command asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deed {
-    Arm,
-    Disarm,
-    Kill,
-    TakeOff,
-    Land,
-    Hold,
-    Guided,
-    Return,
-}
-
-/// A line of the table: the text of a denial, the command to the vehicle, and when it has happened.
-type Line = (&'static str, GuidedKind, fn(&FlightStatus) -> bool);
-
-impl Deed {
-    const fn line(self) -> Line {
-        match self {
-            Self::Arm => ("arming denied", GuidedKind::Arm, |now| now.armed),
-            Self::Disarm => ("disarming denied", GuidedKind::Disarm, |now| !now.armed),
-            Self::Kill => ("motors off denied", GuidedKind::Kill, |now| !now.armed),
-            Self::TakeOff => ("take-off denied", GuidedKind::TakeOff, rises),
-            Self::Land => ("landing denied", GuidedKind::Land, |now| !now.armed || now.phase == FlightPhase::Landing),
-            Self::Hold => ("hold denied", GuidedKind::Hold, is_led),
-            Self::Guided => ("guided mode denied", GuidedKind::Hold, |now| !now.armed || is_led(now)),
-            Self::Return => ("return denied", GuidedKind::WayPoint, is_led),
-        }
-    }
-
-    /// The text of a denial.
-    pub const fn denied(self) -> &'static str {
-        self.line().0
-    }
-
-    /// What the vehicle is asked for. A take-off has a height besides, a return a place.
-    pub fn command(self) -> GuidedCommand {
-        GuidedCommand { kind: self.line().1, ..Default::default() }
-    }
-
-    pub fn has_happened(self, status: &FlightStatus) -> bool {
-        let (_, _, has_happened) = self.line();
-        has_happened(status)
-    }
-
-    /// It ends a flight: nothing may keep it from the vehicle.
-    pub const fn ends_a_flight(self) -> bool {
-        matches!(self, Self::Disarm | Self::Kill | Self::Land)
-    }
-
-    /// What speaks against it before the vehicle is asked.
-    pub fn refusal(self, status: &FlightStatus) -> Option<&'static str> {
-        match self {
-            Self::TakeOff | Self::Hold | Self::Return if !status.armed => Some("motors are off"),
-            Self::Return if status.phase != FlightPhase::Flying => Some("it does not fly"),
-            _ => None,
-        }
-    }
-}
-
-const fn rises(status: &FlightStatus) -> bool {
-    matches!(status.phase, FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Flip)
-}
-
-fn is_led(status: &FlightStatus) -> bool {
-    let lands = status.phase == FlightPhase::Landing;
-    status.armed && !lands && status.commander == CommandSource::Guided
-}
 
 /// A take-off to this height, m.
 pub(super) fn take_off(height: f32) -> GuidedCommand {
@@ -274,21 +188,6 @@ impl<C> Order<C> {
         runner.halt();
         (self.rise, self.since) = (Rise::Asked, now);
         Fate::Waits
-    }
-}
-
-fn refusals(cockpit: &dyn Cockpit) -> u32 {
-    cockpit.view().refusals().map_or(0, |(_, refusals)| refusals.attempts)
-}
-
-/// Why a vehicle in this state does not do something, as far as its state says so.
-pub(super) fn why_not(status: &FlightStatus) -> &'static str {
-    match status {
-        status if !status.armed => status.blocks.names().next().unwrap_or("motors are off"),
-        FlightStatus { phase: FlightPhase::Landing, .. } => "it lands",
-        FlightStatus { commander: CommandSource::Pilot, .. } => "a pilot flies",
-        FlightStatus { commander: CommandSource::Failsafe, .. } => "the failsafe flies",
-        _ => NOT_NOW,
     }
 }
 

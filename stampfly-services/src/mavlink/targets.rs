@@ -12,8 +12,8 @@
 
 use super::commands::Turn;
 use super::leading::{Motion, NotLed};
-use super::orders::why_not;
 use super::unserved::Unserved;
+use crate::deed::why_not;
 use crate::refusal::Refusal;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{FlightPhase, FlightStatus, GuidedCommand, StateEstimate};

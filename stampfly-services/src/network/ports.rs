@@ -52,7 +52,7 @@ impl<const ITEMS: usize> Ports<ITEMS> {
     /// Those of a vehicle with this key. `epoch` as in [`Mavlink::with_key`].
     #[must_use]
     pub fn new(identity: Identity, key: &Key, epoch: u64) -> Self {
-        let mavlink = Mavlink::for_clients(identity).with_key(SigningKey::new(*key.bytes()), epoch);
+        let mavlink = Mavlink::for_clients(identity).with_key(SigningKey::of(key), epoch);
         Self { mavlink, next: Instant::ZERO, stream: None }
     }
 
@@ -81,7 +81,7 @@ impl<const ITEMS: usize> Ports<ITEMS> {
             Heard::Bytes(bytes) => mavlink.hear(now, client, bytes, cockpit, &mut |to, frame| answers.put(*to, frame)),
             Heard::Closed => {
                 *stream = None;
-                mavlink.close(client);
+                mavlink.close(client, cockpit);
             }
         });
         answers.send(ends);

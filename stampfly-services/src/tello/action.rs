@@ -86,13 +86,14 @@ impl Action {
     /// Begins it; `None` when it is done at once.
     pub fn begin(
         now: Instant,
+        seat: Seat,
         command: TelloCommand,
         speed: f32,
         cockpit: &mut dyn Cockpit,
     ) -> Result<Option<Self>, &'static str> {
         let status = cockpit.view().state();
         let flies = status.phase == FlightPhase::Flying;
-        let mut guide = |command| said(cockpit.guide(now, Seat::Tello, command));
+        let mut guide = |command| said(cockpit.guide(now, seat, command));
         let kind = match command {
             TelloCommand::TakeOff if status.armed => return Err("already in the air"),
             // A program that is used to a Tello knows of no calibration.
@@ -126,9 +127,9 @@ impl Action {
                     TelloDirection::Forward => Vec3::x(),
                     TelloDirection::Back => -Vec3::x(),
                 };
-                return fly(now, along * distance, speed, cockpit).map(Some);
+                return fly(now, seat, along * distance, speed, cockpit).map(Some);
             }
-            TelloCommand::Go { offset, speed } if flies => return fly(now, offset, speed, cockpit).map(Some),
+            TelloCommand::Go { offset, speed } if flies => return fly(now, seat, offset, speed, cockpit).map(Some),
             TelloCommand::Rotate { angle } if flies => {
                 let (place, heading) = base(&cockpit.view()).ok_or("no attitude")?;
                 Kind::Turning { place, left: angle, goal: heading }
@@ -154,7 +155,7 @@ impl Action {
     }
 
     /// Looks how far it has come.
-    pub fn go_on(&mut self, now: Instant, cockpit: &mut dyn Cockpit) -> Outcome {
+    pub fn go_on(&mut self, now: Instant, seat: Seat, cockpit: &mut dyn Cockpit) -> Outcome {
         let status = cockpit.view().state();
         let Some((_, estimate)) = cockpit.view().estimate() else { return Outcome::GoesOn };
         let age = now.since(self.begun);
@@ -170,7 +171,7 @@ impl Action {
         }
         match &mut self.kind {
             Kind::GettingReady if status.blocks.is_empty() => {
-                match said(cockpit.guide(now, Seat::Tello, simple(GuidedKind::Arm))) {
+                match said(cockpit.guide(now, seat, simple(GuidedKind::Arm))) {
                     Ok(()) => *self = Self { kind: Kind::Arming, begun: now },
                     Err(why) => return Outcome::Failed(why),
                 }
@@ -180,7 +181,7 @@ impl Action {
             Kind::Arming if status.armed => {
                 let position = Vec3::new(0.0, 0.0, -TAKE_OFF);
                 let rise = GuidedCommand { position, ..simple(GuidedKind::TakeOff) };
-                match said(cockpit.guide(now, Seat::Tello, rise)) {
+                match said(cockpit.guide(now, seat, rise)) {
                     Ok(()) => *self = Self { kind: Kind::Rising, begun: now },
                     Err(why) => return Outcome::Failed(why),
                 }
@@ -210,7 +211,7 @@ impl Action {
                 let part = left.clamp(-QUARTER, QUARTER);
                 (*goal, *left) = (math::wrap_angle(*goal + part), *left - part);
                 let turn = GuidedCommand { position: *place, yaw: *goal, ..Default::default() };
-                match said(cockpit.fly_to(now, Seat::Tello, turn)) {
+                match said(cockpit.fly_to(now, seat, turn)) {
                     Ok(()) => Outcome::GoesOn,
                     Err(why) => Outcome::Failed(why),
                 }
@@ -231,11 +232,11 @@ fn base(view: &View<'_>) -> Option<(Vec3, f32)> {
 }
 
 /// Begins a move, given as the vehicle looks.
-fn fly(now: Instant, offset: Vec3, speed: f32, cockpit: &mut dyn Cockpit) -> Result<Action, &'static str> {
+fn fly(now: Instant, seat: Seat, offset: Vec3, speed: f32, cockpit: &mut dyn Cockpit) -> Result<Action, &'static str> {
     let (place, yaw) = base(&cockpit.view()).ok_or("no position")?;
     let goal = place + frame::from_yaw(yaw).transform_vector(&offset);
     let [low, high] = HEIGHTS;
     let goal = Vec3::new(goal.x, goal.y, goal.z.clamp(-high, -low));
-    said(cockpit.fly_to(now, Seat::Tello, GuidedCommand { position: goal, yaw, speed, ..Default::default() }))?;
+    said(cockpit.fly_to(now, seat, GuidedCommand { position: goal, yaw, speed, ..Default::default() }))?;
     Ok(Action { kind: Kind::Moving { goal }, begun: now })
 }

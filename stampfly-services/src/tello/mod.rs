@@ -15,7 +15,7 @@ mod action;
 mod answers;
 
 use crate::cockpit::Cockpit;
-use crate::refusal::Seat;
+use crate::refusal::{Connection, Seat};
 use action::{Action, Outcome};
 use stampfly_link::tello::{TelloCommand, TelloReply, TelloState};
 use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
@@ -44,8 +44,9 @@ pub enum Destination {
 /// Give it datagrams with [`hear`](Self::hear) and call [`poll`](Self::poll) about fifty times a second.
 #[derive(Clone, Debug)]
 pub struct Tello<C> {
-    /// Who commands, and when it was last heard.
+    /// Who commands, since when at which connection, and when it was last heard.
     program: Option<(C, Instant)>,
+    connection: Connection,
     action: Option<Action>,
     speed: f32,
     /// Sticks as they were last sent, and when.
@@ -71,6 +72,7 @@ impl<C> Tello<C> {
     pub const fn new() -> Self {
         Self {
             program: None,
+            connection: 0,
             action: None,
             speed: SPEED,
             sticks: None,
@@ -82,6 +84,10 @@ impl<C> Tello<C> {
 }
 
 impl<C: Copy + PartialEq> Tello<C> {
+    const fn seat(&self) -> Seat {
+        Seat::Tello(self.connection)
+    }
+
     /// Takes a datagram.
     pub fn hear(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
         let mut say = |reply: TelloReply<'_>| send(&from, &reply, put);
@@ -95,6 +101,11 @@ impl<C: Copy + PartialEq> Tello<C> {
             if taken.is_some() {
                 return say(TelloReply::Error("another program commands"));
             }
+            if !is_program {
+                let before = self.seat();
+                cockpit.leave(&|seat| seat == before);
+                self.connection = cockpit.connection();
+            }
             self.program = Some((from, now));
             return say(TelloReply::Ok);
         }
@@ -102,14 +113,14 @@ impl<C: Copy + PartialEq> Tello<C> {
         if command == TelloCommand::Emergency {
             self.action = None;
             let killed =
-                cockpit.guide(now, Seat::Tello, GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
+                cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
             return say(if killed.is_ok() { TelloReply::Ok } else { TelloReply::Error("not taken") });
         }
         if !is_program {
             return say(TelloReply::Error("say command first"));
         }
         self.program = Some((from, now));
-        cockpit.alive(now, Seat::Tello);
+        cockpit.alive(now, self.seat());
         match command {
             TelloCommand::KeepAlive => say(TelloReply::Ok),
             TelloCommand::Speed { speed } => {
@@ -149,7 +160,7 @@ impl<C: Copy + PartialEq> Tello<C> {
             send(from, &TelloReply::Error("interrupted"), put);
         }
         self.sticks = None;
-        match Action::begin(now, command, self.speed, cockpit) {
+        match Action::begin(now, self.seat(), command, self.speed, cockpit) {
             Ok(Some(action)) => self.action = Some(action),
             Ok(None) => send(from, &TelloReply::Ok, put),
             Err(why) => send(from, &TelloReply::Error(why), put),
@@ -170,9 +181,10 @@ impl<C: Copy + PartialEq> Tello<C> {
             self.sticks = None;
             return;
         }
-        cockpit.alive(now, Seat::Tello);
+        cockpit.alive(now, self.seat());
+        let seat = self.seat();
         if let Some(action) = &mut self.action {
-            let outcome = action.go_on(now, cockpit);
+            let outcome = action.go_on(now, seat, cockpit);
             let reply = match outcome {
                 Outcome::GoesOn => None,
                 Outcome::Done => Some(TelloReply::Ok),
@@ -198,10 +210,10 @@ impl<C: Copy + PartialEq> Tello<C> {
     fn fly_by_hand(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
         let Some((at, input)) = self.sticks else { return };
         if now.since(at) < STICKS {
-            _ = cockpit.steer(now, Seat::Tello, &PilotInput { arm: cockpit.view().state().armed, ..input });
+            _ = cockpit.steer(now, self.seat(), &PilotInput { arm: cockpit.view().state().armed, ..input });
         } else {
             self.sticks = None;
-            _ = cockpit.guide(now, Seat::Tello, GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
+            _ = cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
         }
     }
 }

@@ -24,6 +24,8 @@ struct Line {
     typed: Vec<u8>,
     sent: Vec<u8>,
     table: u16,
+    /// When the station says things, by the vehicle's clock.
+    said: Option<u32>,
 }
 
 impl Line {
@@ -32,7 +34,16 @@ impl Line {
         let table = fingerprint(&topics::TOPICS, vehicle.parameters());
         let (typed, sent) = (Vec::new(), Vec::new());
         let writer = MavlinkWriter::new(245, 190);
-        Self { cable: Cable::new(IDENTITY, table), vehicle, now: Instant::from_secs(1), writer, typed, sent, table }
+        Self {
+            cable: Cable::new(IDENTITY, table),
+            vehicle,
+            now: Instant::from_secs(1),
+            writer,
+            typed,
+            sent,
+            table,
+            said: None,
+        }
     }
 
     fn hear(&mut self, bytes: &[u8]) {
@@ -42,8 +53,8 @@ impl Line {
 
     fn frame(&mut self, payload: &Payload<'_>, number: u16) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let Self { table, writer, .. } = self;
-        Envelope::write(*table, number, payload, &mut |part| {
+        let Self { table, writer, said, .. } = self;
+        Envelope::write(*table, number, *said, payload, &mut |part| {
             let tunnel = Tunnel::new(TYPE, [1, 1], part).unwrap();
             let mut room = [0; LONGEST];
             bytes.extend(writer.write_payload::<MavMessage>(Tunnel::ID, &tunnel.payload(), &mut room).unwrap());
@@ -209,18 +220,63 @@ fn what_only_the_board_can_do_is_answered_when_it_is_done_and_not_while_armed() 
 }
 
 #[test]
+fn what_was_held_up_on_the_line_is_not_done_and_what_ends_a_flight_is() {
+    let mut line = Line::new();
+    let command = |kind| Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() });
+    let arm = command(GuidedKind::Arm);
+    let others = [Payload::WriteParameter { index: 0, value: 2.0 }, Payload::Line("reboot"), arm];
+    line.now = Instant::from_secs(100);
+    for age in [1_500, 5_000, 20_000] {
+        line.said = Some(100_000 - age);
+        for (number, payload) in (1..).zip(&others) {
+            line.ask(payload, number);
+            let heard = line.heard();
+            assert!(heard.len() == 1 && heard[0].0 == number && heard[0].1.contains("expired"), "{heard:?}");
+        }
+        for payload in [command(GuidedKind::None), Payload::Sticks(PilotInput::default())] {
+            line.ask(&payload, 9);
+            assert_eq!(line.heard(), [], "they come again");
+        }
+        assert_eq!(line.turn(), None);
+        assert_eq!((line.vehicle.guided.len(), line.vehicle.alive.len(), line.vehicle.steered.len()), (0, 0, 0));
+    }
+    assert!(line.vehicle.parameters.0 == [1.0, 2.0]);
+    line.vehicle.status(|status| (status.armed, status.phase) = (true, FlightPhase::Flying));
+    for payload in [Payload::Kill, command(GuidedKind::Kill), command(GuidedKind::Land)] {
+        line.ask(&payload, 1);
+        line.vehicle.guided.pop().expect("it has reached the vehicle");
+    }
+    // A second is allowed, and a clock that is ahead.
+    for said in [99_100, 100_000, 104_000] {
+        line.said = Some(said);
+        line.ask(&command(GuidedKind::Hold), 1);
+        line.vehicle.guided.pop().expect("it has reached the vehicle");
+    }
+}
+
+#[test]
 fn commands_are_acknowledged_or_refused_in_words_and_signs_of_life_are_its_own() {
     let mut line = Line::new();
     let command = |kind| Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() });
+    line.ask(&command(GuidedKind::TakeOff), 7);
+    assert_eq!(line.heard()[0].1, "Reply { text: \"refused: motors are off\", last: true }");
     line.ask(&command(GuidedKind::Arm), 1);
     line.ask(&command(GuidedKind::None), 2);
+    line.turn();
+    assert_eq!(line.heard(), [], "it has not happened yet");
+    line.vehicle.status(|status| (status.armed, status.phase) = (true, FlightPhase::Flying));
+    line.turn();
     assert_eq!(line.heard(), [(1, format!("{:?}", Payload::Acknowledgement { counter: 1, taken: true }))]);
     assert_eq!(line.vehicle.alive.len(), 1);
     line.writer = MavlinkWriter::new(9, 190);
     line.ask(&command(GuidedKind::WayPoint), 3);
-    assert!(line.heard()[0].1.contains("MAVLink system 245 commands"));
+    assert!(line.heard()[0].1.contains("MAVLink 245/190, line 1 commands"));
     line.ask(&Payload::Kill, 4);
-    line.ask(&Payload::Sticks(PilotInput { roll: 0.5, ..PilotInput::default() }), 5);
+    let sticks = Payload::Sticks(PilotInput { roll: 0.5, ..PilotInput::default() });
+    line.ask(&sticks, 5);
+    assert!(line.vehicle.steered.is_empty(), "another commands");
+    line.writer = MavlinkWriter::new(245, 190);
+    line.ask(&sticks, 6);
     let kinds: Vec<_> = line.vehicle.guided.iter().map(|command| command.kind).collect();
     assert_eq!((kinds, line.vehicle.steered.len()), (vec![GuidedKind::Arm, GuidedKind::Kill], 1));
 }

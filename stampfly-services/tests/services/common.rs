@@ -6,7 +6,7 @@ use stampfly_flight::console::{self, CommandError, SensorLine};
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
-use stampfly_services::{Cockpit, Lease, Places, Refusal, Request, Seat, View};
+use stampfly_services::{Cockpit, Connection, Lease, Places, Refusal, Request, Seat, View};
 use stampfly_types::messages::{
     CommandSource, FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity,
 };
@@ -121,6 +121,7 @@ pub struct Vehicle {
     newest: Newest,
     places: Places,
     pub lease: Lease,
+    pub connections: Connection,
     pub parameters: Two,
     pub guided: Vec<GuidedCommand>,
     pub steered: Vec<PilotInput>,
@@ -135,6 +136,7 @@ impl Vehicle {
             newest: Newest::new(),
             places: Places::of(&topics::TOPICS),
             lease: Lease::new(),
+            connections: 0,
             parameters: Two([1.0, 2.0]),
             guided: Vec::new(),
             steered: Vec::new(),
@@ -185,7 +187,15 @@ impl Cockpit for Vehicle {
         self.guided.push(command);
         Ok(())
     }
-    fn steer(&mut self, _: Instant, _: Seat, input: &PilotInput) -> Result<(), Refusal> {
+    fn connection(&mut self) -> Connection {
+        self.connections += 1;
+        self.connections
+    }
+    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
+        self.lease.leave(has_left);
+    }
+    fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
+        self.lease.steer(now, seat)?;
         self.steered.push(*input);
         Ok(())
     }

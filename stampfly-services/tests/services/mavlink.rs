@@ -2,6 +2,7 @@
 
 use crate::common::{Id, Vehicle};
 use stampfly_link::mavlink::dialects::common::*;
+use stampfly_link::mavlink::signing::{Signer, SigningKey};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};
 use stampfly_services::{Request, Seat};
@@ -312,11 +313,99 @@ fn there_is_room_for_eight_clients_and_those_that_fall_silent_make_room() {
     }
     assert_eq!(mavlink.refused(), 1);
     assert_eq!(vehicle.alive.len(), CLIENTS);
-    assert!(matches!(vehicle.alive.first(), Some(Seat::Mavlink(_))));
+    assert!(matches!(vehicle.alive.first(), Some(Seat::Mavlink { .. })));
     polled(&mut mavlink, &mut vehicle, 40_000, 40_020);
     let mut late = Station::new(99);
     late.asks(Instant::from_secs(41), &mut mavlink, &mut vehicle, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     assert_eq!(mavlink.refused(), 1);
+}
+
+#[test]
+fn datagrams_that_are_not_mavlink_take_no_place() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::standing());
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    let frame = Station::new(0).says(&heartbeat);
+    let half = frame.len() / 2;
+    let garbage =
+        [&b"takeoff"[..], &frame[..half], &[b"GET / HTTP/1.1\r\n\r\n", frame.as_slice()].concat(), &[], &[0xFD; 40]]
+            .map(<[u8]>::to_vec);
+    for (id, bytes) in (0..200).zip(garbage.iter().cycle()) {
+        mavlink.hear(Instant::ZERO, id, bytes, &mut vehicle, &mut |_, _| panic!("it is answered"));
+    }
+    polled(&mut mavlink, &mut vehicle, 0, 100);
+    assert_eq!((mavlink.refused(), vehicle.alive.len()), (200, 0));
+    let answers = Station::new(201).asks(Instant::from_millis(100), &mut mavlink, &mut vehicle, &arm());
+    assert_eq!((vehicle.guided.len(), answers.is_empty()), (1, true), "it waits to be seen armed");
+}
+
+#[test]
+fn the_commander_is_a_connection_and_not_a_number() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::flying());
+    let (mut one, mut two) = (Station::new(1), Station::new(7));
+    let at = Instant::from_millis;
+    let hold = command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]);
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    one.asks(at(0), &mut mavlink, &mut vehicle, &hold);
+    assert_eq!(vehicle.guided.len(), 1);
+    // Of the same system and component.
+    let answers = two.asks(at(100), &mut mavlink, &mut vehicle, &hold);
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_NOT_IN_CONTROL));
+    mavlink.close(1, &mut vehicle);
+    for ms in (200..10_000).step_by(200) {
+        two.asks(at(ms), &mut mavlink, &mut vehicle, &heartbeat);
+        assert!(ms < 3_000 || !vehicle.lease.is_sign_due(at(ms)), "{ms} ms: another's heartbeats keep it in the air");
+    }
+    vehicle.guided.clear();
+    two.asks(at(10_000), &mut mavlink, &mut vehicle, &hold);
+    assert_eq!(vehicle.guided.len(), 1, "it takes over");
+}
+
+#[test]
+fn what_the_vehicle_has_said_itself_does_not_come_back() {
+    let key = SigningKey::from_passphrase("a phrase");
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key, 1_000), Vehicle::standing());
+    mavlink.open(Instant::ZERO, 1_u8, true);
+    for ms in (0..20_000).step_by(20) {
+        let now = Instant::from_millis(ms);
+        let mut said = Vec::new();
+        mavlink.poll(now, &mut vehicle, &mut |_, frame| said.push(frame.to_vec()));
+        // To the stream it was sent to, and as datagrams.
+        for frame in &said {
+            for client in [1, 2] {
+                mavlink.hear(now, client, frame, &mut vehicle, &mut |_, _| {});
+            }
+        }
+        assert!(!mavlink.is_believed(1) && !mavlink.is_believed(2), "{ms} ms");
+    }
+    assert_eq!(vehicle.alive, []);
+}
+
+#[test]
+fn a_station_whose_clock_is_ahead_does_not_lock_others_out() {
+    let key = SigningKey::from_passphrase("a phrase");
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key.clone(), 1_000), Vehicle::standing());
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    let mut say = |mavlink: &mut Mavlink<u8>, id: u8, ms, signer: &mut Signer| {
+        let (mut room, now) = ([0; LONGEST], Instant::from_millis(ms));
+        let frame = MavlinkWriter::new(200 + id, 190).write_signed(now, &heartbeat, signer, &mut room);
+        let mut newest = 0;
+        mavlink.hear(now, id, frame.expect("there is room"), &mut vehicle, &mut |_, frame| {
+            let mut decoder = MavlinkDecoder::<MavMessage>::new();
+            let heard = frame.iter().find_map(|byte| decoder.feed(*byte).and_then(|frame| frame.signature));
+            newest = newest.max(heard.map_or(0, |signature| signature.time));
+        });
+        newest
+    };
+    let month = 30 * 86_400 * 100_000;
+    say(&mut mavlink, 1, 20, &mut Signer::new(key.clone(), 0, 1_000 + month));
+    assert!(mavlink.is_believed(1));
+    // The vehicle tells one whose clock is right a time that it believes.
+    let mut right = Signer::new(key, 0, 1_000);
+    let told = say(&mut mavlink, 2, 40, &mut right);
+    assert!(told > month && !mavlink.is_believed(2), "{told}");
+    right.not_before(told);
+    say(&mut mavlink, 2, 60, &mut right);
+    assert!(mavlink.is_believed(2));
 }
 
 #[test]
@@ -466,7 +555,7 @@ fn a_calibration_that_ends_otherwise_is_not_taken_and_says_so() {
     assert_eq!(results, [(MavResult::MAV_RESULT_FAILED, 0)]);
     // Whoever has asked is gone: nothing is taken.
     let (mut mavlink, mut vehicle, _) = calibrating();
-    mavlink.close(1);
+    mavlink.close(1, &mut vehicle);
     vehicle.publish_at(Instant::from_millis(100), Id::calibration_report, &report(CalibrationStage::Done, 1.0));
     assert_eq!(calibration_of(1, &polled(&mut mavlink, &mut vehicle, 100, 1_000)), (vec![], vec![]));
     assert_eq!(vehicle.requests.len(), 1);

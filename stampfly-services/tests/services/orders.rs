@@ -215,7 +215,7 @@ fn what_cannot_be_is_denied_at_once_and_people_are_told_why() {
     scene.asks(STATION, MavCmd::MAV_CMD_NAV_LOITER_UNLIM, OFF);
     let said = scene.asks([200, 190], MavCmd::MAV_CMD_NAV_LOITER_UNLIM, OFF);
     assert_eq!(said.results, [(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, MavResult::MAV_RESULT_NOT_IN_CONTROL, [200, 190])]);
-    assert_eq!(said.texts, ["hold denied: MAVLink system 255 commands"]);
+    assert_eq!(said.texts, ["hold denied: MAVLink 255/190, line 1 commands"]);
     // It lands, and does not take off again.
     scene.vehicle.status(|status| status.phase = FlightPhase::Landing);
     assert_eq!(scene.asks(STATION, TAKE_OFF, OFF), Said::default());
@@ -303,22 +303,23 @@ fn disarming_in_the_air_goes_on_until_it_has_landed() {
 
 #[test]
 fn there_is_room_for_three_and_always_for_what_ends_a_flight() {
-    let mut scene = Scene::new(Vehicle::standing());
+    let mut scene = Scene::new(Vehicle::flying());
     for component in 0..3 {
-        assert_eq!(scene.asks([255, component], ARM, ON), Said::default());
+        assert_eq!(scene.asks([255, component], MavCmd::MAV_CMD_NAV_LAND, OFF), Said::default());
     }
-    assert_eq!(scene.asks([255, 4], ARM, ON).results(), [MavResult::MAV_RESULT_TEMPORARILY_REJECTED]);
-    scene.vehicle.status(armed);
+    let hold = scene.asks([255, 0], MavCmd::MAV_CMD_NAV_LOITER_UNLIM, OFF);
+    assert_eq!(hold.results(), [MavResult::MAV_RESULT_TEMPORARILY_REJECTED]);
     scene.asked();
     assert_eq!(scene.asks([255, 4], ARM, KILL).results(), [ACCEPTED], "it has reached the vehicle");
     assert_eq!(scene.asked(), [GuidedKind::Kill]);
+    scene.vehicle.status(|status| status.phase = FlightPhase::Landing);
     let said = scene.passes(20);
     let told: Vec<_> = said.results.iter().map(|(_, result, [_, component])| (*result, *component)).collect();
     assert_eq!(told, [(ACCEPTED, 0), (ACCEPTED, 1), (ACCEPTED, 2)]);
-    // A program that is gone is told nothing.
-    scene.vehicle.status(|status| status.armed = false);
+    let mut scene = Scene::new(Vehicle::standing());
+    // A station that is gone is told nothing.
     scene.asks(STATION, ARM, ON);
-    scene.mavlink.close(1);
+    scene.mavlink.close(1, &mut scene.vehicle);
     scene.vehicle.status(armed);
     assert_eq!(scene.passes(2_000), Said::default());
 }

@@ -16,6 +16,13 @@ pub enum Incoming {
         /// Texts a second, 1 to [`FASTEST_RATE`].
         rate: u8,
     },
+    /// This is the page that was told this session before its connection broke, and goes on as it: `{"id":1,"do":"resume","session":"…"}`.
+    Resume {
+        /// The answer carries it.
+        id: u32,
+        /// As the server has told it.
+        session: String,
+    },
     /// Of a vehicle.
     Ask(Asked),
 }
@@ -24,6 +31,14 @@ pub enum Incoming {
 pub const MOST_TOPICS: usize = 64;
 /// Most state texts a second.
 pub const FASTEST_RATE: u8 = 50;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Resume {
+    #[allow(dead_code, reason = "known, and read before")]
+    r#do: String,
+    session: String,
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -47,7 +62,19 @@ impl Incoming {
             object.remove("id");
             return Self::subscribe(id, object).map_err(|error| (id, error));
         }
+        if object.get("do").is_some_and(|name| name == "resume") {
+            let id = id.ok_or((0, AskError::Missing("id")))?;
+            object.remove("id");
+            return Self::resume(id, object).map_err(|error| (id, error));
+        }
         Asked::from_object(object).map(Self::Ask).map_err(|error| (id.unwrap_or_default(), error))
+    }
+
+    fn resume(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {
+        let Resume { session, .. } =
+            serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
+        printable(&session)?;
+        Ok(Self::Resume { id, session })
     }
 
     fn subscribe(id: u32, object: Map<String, Value>) -> Result<Self, AskError> {

@@ -6,8 +6,8 @@
 //! [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] the [`PilotInput`](stampfly_types::messages::PilotInput) that
 //! every radio link of the project ends in.
 //!
-//! An ask is a JSON object with `vehicle` (its number), `id` (whatever the page likes; the answer repeats it), `do`, and what
-//! belongs to it:
+//! An ask is a JSON object with `vehicle` (its number), `id` (chosen by the page; the answer repeats it), `do`, and what
+//! belongs to it. With `at` it says when it was asked, so that what was held up on its way is not done:
 //!
 //! ```
 //! use stampfly_sim::ask::{Ask, Asked, Guided};
@@ -39,6 +39,8 @@ use std::fmt;
 pub const LONGEST: usize = 4096;
 /// Longest text within an ask (a console line, a fault, a name), bytes.
 pub const LONGEST_TEXT: usize = 256;
+/// Latest `at`, ms: thirty years.
+const LATEST: f64 = 1e12;
 /// Highest number of a vehicle.
 const VEHICLES: u64 = 1000;
 
@@ -47,8 +49,11 @@ const VEHICLES: u64 = 1000;
 pub struct Asked {
     /// Number of the vehicle, from 0.
     pub vehicle: usize,
-    /// Chosen by whoever asks; the answer carries it.
+    /// Chosen by the page; the answer carries it.
     pub id: u32,
+    /// When it was asked, ms, by the clock that the server tells its pages. An ask without it counts as asked when it arrives.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<f64>,
     /// What is asked.
     #[serde(flatten)]
     pub ask: Ask,
@@ -167,9 +172,13 @@ impl Asked {
         };
         let vehicle = number("vehicle", VEHICLES)? as usize;
         let id = number("id", u32::MAX.into())? as u32;
+        let at = match object.remove("at") {
+            None => None,
+            Some(at) => Some(at.as_f64().filter(|at| (0.0..=LATEST).contains(at)).ok_or(AskError::Missing("at"))?),
+        };
         let ask: Ask = serde_json::from_value(object.into()).map_err(|error| AskError::Unknown(error.to_string()))?;
         ask.check()?;
-        Ok(Self { vehicle, id, ask })
+        Ok(Self { vehicle, id, at, ask })
     }
 }
 
@@ -212,6 +221,23 @@ impl Ask {
             Self::FaultClear {} => "fault_clear",
             Self::Speed { .. } => "speed",
         }
+    }
+
+    /// Is it done whatever its age? What ends a flight or stops a motor is; everything else is not, when it was held up on its way.
+    #[must_use]
+    pub const fn is_never_late(&self) -> bool {
+        matches!(
+            self,
+            Self::Guided(Guided::Kill {} | Guided::Land {})
+                | Self::MotorStop {}
+                | Self::Sticks(Sticks { kill: true, .. })
+        )
+    }
+
+    /// Is it said again and again, and not answered?
+    #[must_use]
+    pub const fn is_repeated(&self) -> bool {
+        matches!(self, Self::Sticks(_) | Self::Alive {})
     }
 
     /// Is every number in its range, and every text printable and short?
@@ -330,6 +356,10 @@ mod tests {
         assert_eq!(Asked::parse("[]"), Err(AskError::NotJson));
         assert_eq!(Asked::parse(r#"{"vehicle":0,"do":"param_save"}"#), Err(AskError::Missing("id")));
         assert_eq!(Asked::parse(r#"{"vehicle":-1,"id":1,"do":"param_save"}"#), Err(AskError::Missing("vehicle")));
+        for at in ["-1", "\"now\"", "null", "1e13"] {
+            let text = format!(r#"{{"vehicle":0,"id":1,"at":{at},"do":"param_save"}}"#);
+            assert_eq!(Asked::parse(&text), Err(AskError::Missing("at")), "{at}");
+        }
     }
 
     #[test]
@@ -382,7 +412,7 @@ mod tests {
         fn sticks_come_back(sticks in prop::array::uniform4(-1.0_f32..=1.0), arm: bool, kill: bool) {
             let [roll, pitch, yaw, throttle] = sticks;
             let ask = Ask::Sticks(Sticks { roll, pitch, yaw, throttle, mode: Mode::Acro, arm, kill });
-            let asked = Asked { vehicle: 1, id: 9, ask };
+            let asked = Asked { vehicle: 1, id: 9, at: Some(17.25), ask };
             let text = serde_json::to_string(&asked).expect("JSON");
             prop_assert_eq!(Asked::parse(&text), Ok(asked));
         }

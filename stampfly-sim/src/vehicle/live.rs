@@ -35,6 +35,37 @@ pub enum Transport {
     Page,
 }
 
+/// The language of a port. A stream whose first bytes are of another one is ended before anything is made of it: a web page
+/// can open a stream to any port of the machine that shows it, and say what it likes behind the head of its request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speech {
+    /// MAVLink: frames from the first byte on.
+    Mavlink,
+    /// MSP: frames from the first byte on.
+    Msp,
+    /// Lines that a person types.
+    Text,
+    /// What a board speaks on USB: frames of MAVLink, and lines that a person types.
+    Cable,
+    /// HTTP, which its server judges.
+    Http,
+    /// Datagrams, each of which is judged by itself.
+    Datagrams,
+}
+
+/// What stops others than programs on this machine at a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Guard {
+    /// Nothing: the vehicle only sends there.
+    SendsOnly,
+    /// The key: what is not signed or sealed with it does nothing. Without a key the port is not opened for others.
+    Key,
+    /// A secret in the address of the page, which is made from the key. Without a key the port is not opened for others.
+    Secret,
+    /// The language has no room for a key: the port is on this machine alone.
+    Loopback,
+}
+
 /// A port of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortSpec {
@@ -47,15 +78,23 @@ pub struct PortSpec {
     pub number: u16,
     /// What is spoken there.
     pub meaning: &'static str,
-    /// Where others than programs on this machine reach it, what is said there must be signed: it is not opened there without a key.
-    pub signed: bool,
+    /// What a program there may do.
+    pub may: &'static str,
+    /// Its language.
+    pub speech: Speech,
+    /// What stops others.
+    pub guard: Guard,
+    /// Is it opened only when an option names it?
+    pub when_named: bool,
 }
 
 /// What is said at ports that others can reach is signed with this.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Signing {
     /// The key that both ends share.
     pub key: [u8; 32],
+    /// The pass-phrase of stations that speak MAVLink, which is made of the key.
+    pub phrase: String,
     /// The time at which it is asked for, in MAVLink's units: 10 µs since 2015 began.
     pub time: u64,
 }
@@ -66,38 +105,61 @@ impl fmt::Debug for Signing {
     }
 }
 
+/// What a station with the key may do.
+const STATION: &str = "fly; with motors off everything that the console does";
+/// What configurators may do.
+const TUNE: &str = "read its state, change gains";
+/// What a program may do at a port, unless another thing is said of it.
+const FLY: &str = "fly, change parameters";
+
 impl PortSpec {
     /// The page of a ground station.
-    pub const PAGE: Self =
-        Self { transport: Transport::Page, ..Self::tcp("http", 8_080, "the ground station, in a browser") };
+    pub const PAGE: Self = Self {
+        transport: Transport::Page,
+        guard: Guard::Secret,
+        may: "fly, change parameters, calibrate, turn motors, inject faults, take the log",
+        ..Self::tcp("http", 8_080, Speech::Http, "the ground station, in a browser")
+    };
     /// Where ground stations expect MAVLink to be sent to.
     pub const MAVLINK_UDP: Self = Self {
         transport: Transport::UdpTo,
-        signed: true,
+        guard: Guard::Key,
         ..Self::udp("mavlink-udp", 14_550, "MAVLink, for ground stations")
     };
     /// Where programs connect for MAVLink.
-    pub const MAVLINK_TCP: Self =
-        Self { signed: true, ..Self::tcp("mavlink-tcp", 5_760, "MAVLink, for programs that connect") };
-
-    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nobody can, and it is not opened.
-    pub const SEALED: Self = Self::udp("sealed", 14_560, "sealed frames of a station with the key");
+    pub const MAVLINK_TCP: Self = Self {
+        guard: Guard::Key,
+        ..Self::tcp("mavlink-tcp", 5_760, Speech::Mavlink, "MAVLink, for programs that connect")
+    };
+    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nothing is heard there, and it is not opened.
+    pub const SEALED: Self = Self {
+        guard: Guard::Key,
+        may: STATION,
+        ..Self::udp("sealed", 14_560, "sealed frames of a station with the key")
+    };
     /// Where configurators connect for MSP.
-    pub const MSP: Self = Self::tcp("msp", 5_761, "MSP, for configurators");
+    pub const MSP: Self = Self { may: TUNE, ..Self::tcp("msp", 5_761, Speech::Msp, "MSP, for configurators") };
     /// The same for programs that open a serial port.
-    pub const MSP_SERIAL: Self =
-        Self { transport: Transport::Terminal, ..Self::tcp("msp-serial", 0, "the same, at a serial port") };
+    pub const MSP_SERIAL: Self = Self {
+        name: "msp-serial",
+        transport: Transport::Terminal,
+        number: 0,
+        meaning: "the same, at a serial port",
+        ..Self::MSP
+    };
 
-    /// A port that datagrams come to.
+    /// A port that datagrams come to, on this machine alone.
     #[must_use]
     pub const fn udp(name: &'static str, number: u16, meaning: &'static str) -> Self {
-        Self { name, transport: Transport::Udp, number, meaning, signed: false }
+        let (transport, speech, guard) = (Transport::Udp, Speech::Datagrams, Guard::Loopback);
+        Self { name, transport, number, meaning, may: FLY, speech, guard, when_named: false }
     }
 
-    /// A port that programs connect to.
+    /// A port that programs connect to, on this machine alone.
     #[must_use]
-    pub const fn tcp(name: &'static str, number: u16, meaning: &'static str) -> Self {
-        Self { name, transport: Transport::Tcp, number, meaning, signed: false }
+    pub const fn tcp(name: &'static str, number: u16, speech: Speech, meaning: &'static str) -> Self {
+        let (transport, guard) = (Transport::Tcp, Guard::Loopback);
+        Self { name, transport, number, meaning, may: FLY, speech, guard, when_named: false }
     }
 }
 
@@ -129,6 +191,9 @@ pub trait Ports: fmt::Debug + Send + Sync {
 
     /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
+
+    /// Tells every page what happens to the vehicle. Nothing by default.
+    fn tell(&self, _text: &str) {}
 
     /// Do only programs on this machine reach that port?
     fn is_local(&self, _port: usize) -> bool {

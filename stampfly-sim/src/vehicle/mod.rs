@@ -29,7 +29,7 @@ pub mod table;
 mod witness;
 
 pub use executor::{Ended, FlightOptions, Flying, fly, fly_remote};
-pub use live::{Client, Heard, Link, Live, PortSpec, Ports, Put, Signing, Speed, Transport};
+pub use live::{Client, Guard, Heard, Link, Live, PortSpec, Ports, Put, Signing, Speech, Speed, Transport};
 pub use page::{Body, Motion, Observer, Page, PanelSpec, Pick};
 pub use remote::{Figures, Port, Remote, RemoteError, Settings};
 pub use scenario::Scenario;

@@ -6,6 +6,7 @@ use crate::VehicleConfig;
 use crate::simulation::terminal::{Desk, Terminal, said};
 use crate::topics::TOPICS;
 use stampfly_flight::console::Request;
+use stampfly_services::Cockpit;
 use stampfly_services::cable::{self, fingerprint};
 use stampfly_services::mavlink::Identity;
 use stampfly_sim::vehicle::Client;
@@ -40,6 +41,11 @@ impl Cable {
             put(core::mem::take(&mut self.terminal.screen).as_bytes());
         }
         self.answer(now, controls, desk, put);
+    }
+
+    /// The line is gone.
+    pub fn close(&mut self, cockpit: &mut dyn Cockpit) {
+        self.line.close(cockpit);
     }
 
     /// Sends what is due.

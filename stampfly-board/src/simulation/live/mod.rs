@@ -38,7 +38,7 @@ use stampfly_services::cable::BODY;
 use stampfly_services::tape::RADIO_CHUNK;
 use stampfly_services::{DataStream, Places, Tape, Telemetry, View, version};
 use stampfly_sim::ground::About;
-use stampfly_sim::vehicle::{Client, PortSpec, Transport};
+use stampfly_sim::vehicle::{Client, Guard, PortSpec, Speech, Transport};
 use stampfly_types::Instant;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -49,15 +49,31 @@ pub const PORTS: &[PortSpec] = &[
     PortSpec::PAGE,
     PortSpec::MAVLINK_UDP,
     PortSpec::MAVLINK_TCP,
-    PortSpec::udp("tello", 8_889, "text commands of a Tello"),
-    PortSpec { transport: Transport::UdpTo, ..PortSpec::udp("tello-state", 8_890, "its state, to whoever commands") },
-    PortSpec { transport: Transport::UdpTo, ..PortSpec::udp("telemetry", 5_005, "a packet in 20 ms, for displays") },
-    PortSpec::udp("stream", 8_890, "every control cycle, for who asks"),
-    PortSpec::tcp("console", 2_323, "the command line: nc, telnet"),
+    PortSpec { may: "fly", ..PortSpec::udp("tello", 8_889, "text commands of a Tello") },
+    PortSpec {
+        transport: Transport::UdpTo,
+        guard: Guard::SendsOnly,
+        may: "see its state",
+        ..PortSpec::udp("tello-state", 8_890, "its state, to the program that commands")
+    },
+    PortSpec {
+        transport: Transport::UdpTo,
+        guard: Guard::SendsOnly,
+        may: "see its state",
+        ..PortSpec::udp("telemetry", 5_005, "a packet in 20 ms, for displays")
+    },
+    PortSpec {
+        may: "see every control cycle",
+        ..PortSpec::udp("stream", 8_890, "every control cycle, for programs that ask")
+    },
+    PortSpec {
+        may: "with motors off: change parameters, calibrate, turn motors, restart it",
+        ..PortSpec::tcp("console", 2_323, Speech::Text, "the command line: nc, telnet")
+    },
     PortSpec::MSP,
     PortSpec::MSP_SERIAL,
-    PortSpec { transport: Transport::Terminal, ..PortSpec::tcp("usb", 0, "what a board speaks on USB") },
-    PortSpec::tcp("usb-tcp", 5_763, "the same, for programs that connect"),
+    PortSpec { transport: Transport::Terminal, ..PortSpec::tcp("usb", 0, Speech::Cable, "what a board speaks on USB") },
+    PortSpec::tcp("usb-tcp", 5_763, Speech::Cable, "the same, for programs that connect"),
     PortSpec::SEALED,
 ];
 

@@ -148,6 +148,9 @@ impl Link for Services<'_> {
                 self.plug(now, from, Some(bytes), put);
             }
             (USB | USB_TCP, Heard::Closed) => {
+                if let Some((_, cable)) = self.cables.iter_mut().find(|(client, _)| *client == from) {
+                    cable.close(&mut self.controls.seated(&*newest));
+                }
                 self.seen.tape.borrow_mut().ask(now, from, false);
                 self.cables.retain(|(client, _)| *client != from);
             }

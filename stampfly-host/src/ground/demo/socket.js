@@ -22,6 +22,7 @@ class LocalSocket extends EventTarget {
   send(text) { local.worker.postMessage({ text }); }
 }
 
+const watchesLink = false;
 const openSocket = () => new LocalSocket();
 const logAddress = () => '#';
 

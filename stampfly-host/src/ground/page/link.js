@@ -1,12 +1,22 @@
 // The WebSocket: what the server tells, what the page asks, and how well it goes.
 
 const RATE = 50;
-const link = { socket: null, next: 1, waiting: new Map(), texts: 0, dropped: 0, rate: 0, delay: NaN, since: 0, isOpen: false };
+const link = { session: null, socket: null, next: 1, waiting: new Map(), texts: 0, dropped: 0, rate: 0, delay: NaN, since: 0, isOpen: false };
 const listeners = { hello: [], state: [], event: [], link: [] };
 const on = (kind, listener) => listeners[kind].push(listener);
 const tell = (kind, value) => listeners[kind].forEach((listener) => listener(value));
 
 const ANSWER_TIME = 5000;
+
+// The server tells its clock with every text. The largest difference to this page's is of the text that came fastest, so the sum is never ahead
+// of the server's clock: what is asked is at worst taken for older than it is. What comes more than a second late is not done.
+const DRIFT = 1e-4;
+const hearClock = (now) => {
+  const here = performance.now();
+  const known = link.clock ? link.clock.now + (here - link.clock.here) * (1 - DRIFT) : -Infinity;
+  if (now > known) link.clock = { now, here };
+};
+const serverTime = () => (link.clock ? { at: Math.max(0, Math.round(link.clock.now + (performance.now() - link.clock.here) * (1 - DRIFT))) } : {});
 
 /** Asks something; the promise is the reply, `{ok, text, value}`. Never rejected. */
 const ask = (vehicle, what) => new Promise((resolve) => {
@@ -17,12 +27,12 @@ const ask = (vehicle, what) => new Promise((resolve) => {
     resolve({ ok: false, text: 'no answer' });
   }, ANSWER_TIME);
   link.waiting.set(id, { resolve, timer, since: performance.now() });
-  link.socket.send(JSON.stringify(vehicle === null ? { id, ...what } : { vehicle, id, ...what }));
+  link.socket.send(JSON.stringify(vehicle === null ? { id, ...what } : { vehicle, id, ...serverTime(), ...what }));
 });
 
 /** Asks what has no answer. */
 const say = (vehicle, what) => {
-  if (link.isOpen && link.socket.bufferedAmount < 20000) link.socket.send(JSON.stringify({ vehicle, id: 0, ...what }));
+  if (link.isOpen && link.socket.bufferedAmount < 20000) link.socket.send(JSON.stringify({ vehicle, id: 0, ...serverTime(), ...what }));
 };
 
 const subscribe = (topics) => ask(null, { do: 'subscribe', topics, rate: RATE });
@@ -30,6 +40,7 @@ const subscribe = (topics) => ask(null, { do: 'subscribe', topics, rate: RATE })
 const heard = (text) => {
   const message = JSON.parse(text);
   if (message.state) {
+    hearClock(message.now);
     link.texts++;
     link.dropped = message.dropped;
     tell('state', message.state);
@@ -41,25 +52,47 @@ const heard = (text) => {
     link.delay = performance.now() - waiting.since;
     waiting.resolve(message.reply);
   } else if (message.event) tell('event', message.event);
-  else if (message.hello) tell('hello', message.hello);
+  else if (message.hello) { hearClock(message.hello.now); tell('hello', message.hello); }
 };
 
 const connect = () => {
   const socket = openSocket();
   link.socket = socket;
-  socket.addEventListener('open', () => { link.isOpen = true; tell('link', true); });
-  socket.addEventListener('message', (event) => heard(event.data));
-  socket.addEventListener('close', () => {
-    link.isOpen = false;
-    for (const { resolve, timer } of link.waiting.values()) {
-      clearTimeout(timer);
-      resolve({ ok: false, text: 'the connection broke' });
-    }
-    link.waiting.clear();
-    tell('link', false);
-    setTimeout(connect, 1000);
-  });
+  link.clock = null;
+  link.last = performance.now();
+  socket.addEventListener('open', () => { if (socket === link.socket) { link.isOpen = true; link.last = performance.now(); tell('link', true); } });
+  socket.addEventListener('message', (event) => { if (socket === link.socket) { link.last = performance.now(); heard(event.data); } });
+  socket.addEventListener('close', () => { if (socket === link.socket) giveUp(); });
 };
+
+/** The connection is gone, or says nothing: what is waited for will not come, and a new one is tried. */
+const giveUp = () => {
+  const socket = link.socket;
+  link.socket = null;
+  link.isOpen = false;
+  for (const { resolve, timer } of link.waiting.values()) {
+    clearTimeout(timer);
+    resolve({ ok: false, text: 'the connection broke: it is not done' });
+  }
+  link.waiting.clear();
+  socket?.close();
+  tell('link', false);
+  setTimeout(connect, 500);
+};
+
+// A server that is there says something fifty times a second.
+const SILENT = 2000;
+const watchLink = () => { if (link.isOpen && performance.now() - link.last > SILENT) giveUp(); };
+if (watchesLink) setInterval(watchLink, 250);
+
+// The page goes on as who it was before its connection broke, so that it keeps the vehicle that it flies.
+on('hello', ({ page }) => {
+  const before = link.session;
+  link.page = page?.number;
+  link.session = page?.session || null;
+  if (!before || !link.session || before === link.session) return;
+  ask(null, { do: 'resume', session: before }).then(({ ok }) => { if (ok) link.session = before; });
+});
 
 const SIGN_OF_LIFE = 500;
 

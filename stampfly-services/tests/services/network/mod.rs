@@ -174,7 +174,7 @@ impl Program {
 }
 
 fn signing(with: u8) -> SigningKey {
-    SigningKey::new(*key(with).bytes())
+    SigningKey::of(&key(with))
 }
 
 fn question() -> MavMessage {

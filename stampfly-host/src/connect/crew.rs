@@ -1,0 +1,133 @@
+//! Who commands a vehicle behind `connect`: which page, and which program.
+//!
+//! At the vehicle's end all pages are one station, and programs of the same system and component number are one. So this end tells them apart: one page has
+//! the [`Lease`], as at the ports of a simulated vehicle, and numbers belong to the connection that has used them first. What others say with
+//! them does not keep a vehicle in the air whose commander has left.
+
+#![allow(deprecated, reason = "programs speak what the protocol has superseded for years after")]
+
+use stampfly_link::mavlink::MessageData;
+use stampfly_link::mavlink::dialects::common::*;
+use stampfly_services::{Lease, Refusal, Seat};
+use stampfly_sim::ask::{Ask, Guided};
+use stampfly_sim::vehicle::Client;
+use stampfly_types::messages::GuidedCommand;
+use stampfly_types::{Duration, Instant};
+use std::collections::HashMap;
+
+/// Numbers are free when the connection that has used them was not heard for this long: the vehicle has taken its link for lost by then.
+const FREE: Duration = Duration::from_secs(4);
+/// What a program may ask with the numbers of another: what changes nothing, and is no sign of life.
+const READS: [u32; 6] = [
+    PARAM_REQUEST_LIST_DATA::ID,
+    PARAM_REQUEST_READ_DATA::ID,
+    MISSION_REQUEST_LIST_DATA::ID,
+    MISSION_REQUEST_DATA::ID,
+    MISSION_REQUEST_INT_DATA::ID,
+    TIMESYNC_DATA::ID,
+];
+
+/// Who commands.
+#[derive(Debug, Default)]
+pub(super) struct Crew {
+    lease: Lease,
+    /// Systems and components, who uses them, and when they were last heard.
+    numbers: HashMap<[u8; 2], (Client, Instant)>,
+}
+
+impl Crew {
+    /// May this ask of a page go to the vehicle? `None`: it is to be left out, and needs no answer.
+    ///
+    /// # Errors
+    /// When another page commands.
+    pub fn ask(&mut self, now: Instant, page: u64, ask: &Ask) -> Result<Option<()>, Refusal> {
+        let seat = Seat::Page(page as u32);
+        match ask {
+            Ask::Guided(Guided::Kill {}) => {}
+            Ask::Guided(guided) => self.lease.ask(now, seat, &GuidedCommand::from(*guided))?,
+            Ask::Sticks(sticks) if sticks.kill => {}
+            Ask::Sticks(_) => return Ok(self.lease.steer(now, seat).ok()),
+            Ask::Alive {} => {
+                self.lease.alive(now, seat);
+                return Ok(self.lease.is_holders(seat).then_some(()));
+            }
+            _ => {}
+        }
+        Ok(Some(()))
+    }
+
+    /// This page is gone.
+    pub fn leave(&mut self, page: u64) {
+        self.lease.leave(|seat| seat == Seat::Page(page as u32));
+    }
+
+    /// The vehicle stands with its motors off.
+    pub fn release(&mut self) {
+        self.lease.release();
+    }
+
+    /// May this frame of a program go to the vehicle?
+    pub fn may(&mut self, now: Instant, program: Client, numbers: [u8; 2], id: u32) -> bool {
+        let (owner, heard) = self.numbers.entry(numbers).or_insert((program, now));
+        if *owner != program && now.since(*heard) >= FREE {
+            *owner = program;
+        }
+        if *owner == program {
+            *heard = now;
+        }
+        *owner == program || READS.contains(&id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stampfly_sim::ask::Sticks;
+
+    fn program(number: u16) -> Client {
+        Client { port: 2, address: ([127, 0, 0, 1], number).into() }
+    }
+
+    #[test]
+    fn numbers_are_of_one_connection_until_the_vehicle_has_noticed_that_it_is_gone() {
+        let (mut crew, ids) = (Crew::default(), [255, 190]);
+        let at = |ms| Instant::from_millis(ms);
+        let mut beat = |ms, number| crew.may(at(ms), program(number), ids, HEARTBEAT_DATA::ID);
+        for ms in (0..5_000).step_by(1_000) {
+            assert!(beat(ms, 1) && !beat(ms + 500, 2));
+        }
+        // It is gone. The other chatters on, and is not heard before the vehicle's own patience is over.
+        for ms in (5_000..8_000).step_by(500) {
+            assert!(!beat(ms, 2), "{ms} ms");
+        }
+        assert!(beat(8_000, 2) && !beat(8_100, 1));
+        assert!(crew.may(at(8_200), program(1), ids, PARAM_REQUEST_READ_DATA::ID));
+        assert!(crew.may(at(8_200), program(1), [254, 190], HEARTBEAT_DATA::ID));
+    }
+
+    #[test]
+    fn one_page_commands_and_a_page_that_watches_is_no_sign_of_life_for_it() {
+        let mut crew = Crew::default();
+        let (arm, sticks) = (Ask::Guided(Guided::Arm {}), Ask::Sticks(Sticks::default()));
+        let at = |seconds| Instant::from_secs(seconds);
+        assert_eq!(crew.ask(at(0), 2, &Ask::Alive {}), Ok(Some(())), "none commands yet");
+        assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(())));
+        assert_eq!(crew.ask(at(1), 2, &arm), Err(Refusal::Occupied(Seat::Page(1))));
+        for (page, passes) in [(1, Some(())), (2, None)] {
+            assert_eq!(crew.ask(at(1), page, &Ask::Alive {}), Ok(passes));
+            assert_eq!(crew.ask(at(1), page, &sticks), Ok(passes));
+        }
+        crew.leave(1);
+        for seconds in 2..20 {
+            for silent in [&Ask::Alive {}, &sticks] {
+                assert_eq!(crew.ask(at(seconds), 2, silent), Ok(None));
+            }
+        }
+        for stops in [Guided::Kill {}, Guided::Land {}] {
+            assert_eq!(crew.ask(at(20), 2, &Ask::Guided(stops)), Ok(Some(())));
+        }
+        assert_eq!(crew.ask(at(20), 2, &sticks), Ok(Some(())), "it has taken over");
+        crew.release();
+        assert_eq!(crew.ask(at(21), 3, &arm), Ok(Some(())));
+    }
+}
