@@ -1,5 +1,6 @@
-"""Signs with pymavlink at a vehicle's ports in a network: python mavlink_ports.py udpout:192.0.2.7:14550 tcp:192.0.2.7:5760 KEY_FILE"""
+"""Signs with pymavlink at a vehicle's ports in a network: python mavlink_ports.py udpout:192.0.2.7:14550 tcp:192.0.2.7:5760 PHRASE"""
 
+import hashlib
 import os
 import sys
 import time
@@ -32,8 +33,8 @@ def parameter(line, seconds):
 
 def main():
     datagrams, stream = sys.argv[1:3]
-    with open(sys.argv[3], encoding="ascii") as file:
-        key = bytes.fromhex(file.read().split()[0])
+    # As ground stations do it.
+    key = hashlib.sha256(sys.argv[3].encode()).digest()
 
     for name, line in (("datagrams", connect(datagrams, key)), ("stream", connect(stream, key))):
         before = line.mav.signing.timestamp

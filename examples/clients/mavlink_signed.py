@@ -1,5 +1,6 @@
-"""Signs with pymavlink, and shows that others are ignored: python mavlink_signed.py tcp:192.0.2.7:5760 KEY_FILE [PARAMETER]"""
+"""Signs with pymavlink, and shows that others are ignored: python mavlink_signed.py tcp:192.0.2.7:5760 PHRASE [PARAMETER]"""
 
+import hashlib
 import os
 import sys
 import time
@@ -38,8 +39,8 @@ def parameter(line, seconds):
 
 
 def main():
-    with open(sys.argv[2], encoding="ascii") as file:
-        key = bytes.fromhex(file.read().split()[0])
+    # As ground stations do it.
+    key = hashlib.sha256(sys.argv[2].encode()).digest()
 
     own = connect(sys.argv[1], key)
     assert own.wait_heartbeat(timeout=10) is not None, "no heartbeat that is signed with the key"

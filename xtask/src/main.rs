@@ -152,7 +152,8 @@ const STEPS: &[Step] = &[
         .holding(&[Machine])
         .accepting(&[Fix]),
     // Only by name.
-    Step::manual("controls", "Break what each step looks for: it has to fail", steps::controls::run).accepting(&[Fix, Rest]),
+    Step::manual("controls", "Break what each step looks for: it has to fail", steps::controls::run)
+        .accepting(&[Fix, Rest]),
     Step::manual("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build),
     Step::manual("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters).accepting(&[Rest]),
     Step::manual("figures", "Measure the README's figures and write them there", steps::figures::run),

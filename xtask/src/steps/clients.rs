@@ -44,7 +44,7 @@ const SCRIPTS: [Script; 15] = [
     ("mavlink_quad.py", &["udpin:{mavlink-udp}"], &["--vehicle", "stm32-quad"]),
     (
         "mavlink_signed.py",
-        &["tcp:{mavlink-tcp}", "{key}", "roll.p"],
+        &["tcp:{mavlink-tcp}", "{phrase}", "roll.p"],
         &["--vehicle", "stm32-quad", "--key", "{key}", "--sign-all"],
     ),
 ];
@@ -100,15 +100,11 @@ fn flown(
 /// What the firmware has at its ports, on this computer's sockets: only the sockets are others.
 fn the_firmwares_ports(repository: &Repository, python: &Path) -> Result<(), Failure> {
     let script = "mavlink_ports.py";
-    let folder = repository.target("clients");
-    let key = folder.join("ports-key");
-    let digits: String = (0..32).map(|byte| format!("{byte:02x}")).collect();
-    std::fs::write(&key, digits).map_err(|error| format!("{}: {error}", key.display()))?;
     let program = example(repository, "ports")?;
     let process = Command::new(&program).arg(SECONDS).stdout(Stdio::piped()).spawn();
     let mut process = process.map_err(|error| format!("{program:?}: {error}"))?;
     let stdout = process.stdout.take().ok_or("no standard output")?;
-    let mut vehicle = Vehicle { process, ports: vec![("key".into(), key.to_string_lossy().into_owned())] };
+    let mut vehicle = Vehicle { process, ports: Vec::new() };
     for line in BufReader::new(stdout).lines() {
         let line = line.map_err(|error| error.to_string())?;
         let (name, place) = line.split_once(' ').ok_or("no port")?;
@@ -117,7 +113,7 @@ fn the_firmwares_ports(repository: &Repository, python: &Path) -> Result<(), Fai
             break;
         }
     }
-    let arguments = ["udpout:{mavlink-udp}", "tcp:{mavlink-tcp}", "{key}"];
+    let arguments = ["udpout:{mavlink-udp}", "tcp:{mavlink-tcp}", "{phrase}"];
     let said = script_with(repository, python, script, &arguments, &vehicle)?;
     print!("{script}\n{}", indented(&said));
     drop(vehicle.process.kill());
@@ -138,6 +134,15 @@ fn refuses_strangers(program: &Path) -> Result<(), Failure> {
         true => Ok(()),
         false => Err("MAVLink is open to everybody without a key".into()),
     }
+}
+
+/// A key that other accounts can read is refused.
+fn closed_to_others(file: &Path) -> Result<(), Failure> {
+    #[cfg(unix)]
+    std::fs::set_permissions(file, std::os::unix::fs::PermissionsExt::from_mode(0o600))
+        .map_err(|error| format!("{}: {error}", file.display()))?;
+    _ = file;
+    Ok(())
 }
 
 /// One for each time the vehicle was switched on.
@@ -194,7 +199,9 @@ impl Vehicle {
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
         let key = out.join("key");
         std::fs::write(&key, KEY).map_err(|error| format!("{}: {error}", key.display()))?;
+        closed_to_others(&key)?;
         let key = key.to_string_lossy().into_owned();
+        let (phrase, _) = capture(Command::new(program).args(["key", "mavlink", &key]))?;
         let free = free_ports()?;
         let [state, telemetry, mavlink] = free;
         let mut command = Command::new(program);
@@ -218,8 +225,14 @@ impl Vehicle {
         command.args(options.iter().map(|option| option.replace("{key}", &key)));
         let mut process = command.stdout(Stdio::piped()).spawn().map_err(|error| format!("{program:?}: {error}"))?;
         let stdout = process.stdout.take().ok_or("no standard output")?;
-        let mut vehicle =
-            Self { process, ports: vec![("free".into(), free_ports()?[0].to_string()), ("key".into(), key)] };
+        let mut vehicle = Self {
+            process,
+            ports: vec![
+                ("free".into(), free_ports()?[0].to_string()),
+                ("key".into(), key),
+                ("phrase".into(), phrase.trim().into()),
+            ],
+        };
         for line in BufReader::new(stdout).lines() {
             let line = line.map_err(|error| error.to_string())?;
             let mut words = line.split_whitespace();

@@ -74,6 +74,10 @@ const GENERATED: &[(&str, &str, &str)] = &[
     ),
 ];
 
+/// A table within a document: the subcommand of `stampfly` that prints it, and what is before and after it.
+const WITHIN: (&str, (&str, &str, &str)) =
+    ("doors", ("SECURITY.md", "<!-- doors: cargo xtask docs --fix -->\n", "<!-- end of doors -->"));
+
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
     let root = &repository.root;
     let (documents, _) =
@@ -113,6 +117,9 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     let bugs = bugs::table(&List::read(repository)?.bugs);
     let mutants = mutants::table(&Mutants::read(repository)?);
     let controls = Controls::read(repository)?.table();
+    let (command, place) = WITHIN;
+    let (doors, _) = capture(stampfly(repository)?.args([command, "--markdown"]))?;
+    failures.extend(stale(repository, place, &format!("\n{doors}\n"), arguments.fix)?);
     for (place, table) in [(bugs::PLACE, bugs), (mutants::PLACE, mutants), (control::PLACE, controls)] {
         failures.extend(stale(repository, place, &table, arguments.fix)?);
     }
