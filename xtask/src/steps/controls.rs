@@ -76,7 +76,9 @@ fn tried(repository: &Repository, clone: &Path, control: &Control) -> Result<Str
     if !control.changes.is_empty() {
         git(&["reset", "--quiet", "--hard", "HEAD~1"])?;
     }
-    judged(control, said?)
+    // Paths are those of the repository, whichever machine this is.
+    let folder = format!("{}/", clone.display());
+    judged(control, said?).map(|line| line.replace(&folder, ""))
 }
 
 /// Runs the step in the clone. Returns whether it passed and everything it wrote.
