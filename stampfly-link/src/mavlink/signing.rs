@@ -44,7 +44,7 @@ impl SigningKey {
     /// The key of a vehicle's stations that speak MAVLink: that of the [phrase](crate::secure::Key::phrase) of its own key.
     #[must_use]
     pub fn of(key: &crate::secure::Key) -> Self {
-        Self::from_passphrase(&key.phrase())
+        Self::from_passphrase(key.phrase().as_str())
     }
 
     fn digest(&self, signed: &[u8], link: u8, time: u64) -> [u8; 6] {

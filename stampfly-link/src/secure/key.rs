@@ -133,13 +133,12 @@ impl Key {
     /// The pass-phrase of stations that speak MAVLink: 64 digits, to be typed or pasted where a ground station asks for one. Who knows it can
     /// [sign](crate::mavlink::signing) and not seal.
     #[must_use]
-    pub fn phrase(&self) -> heapless::String<{ 2 * KEY }> {
-        let mut phrase = heapless::String::new();
-        // There is room for all of it.
-        for byte in self.purpose(MAVLINK) {
-            _ = fmt::write(&mut phrase, format_args!("{byte:02x}"));
+    pub fn phrase(&self) -> Phrase {
+        let mut digits = [0; 2 * KEY];
+        for (pair, byte) in digits.as_chunks_mut::<2>().0.iter_mut().zip(self.purpose(MAVLINK)) {
+            *pair = [byte >> 4, byte & 0xF].map(|digit| if digit < 10 { b'0' + digit } else { b'a' + digit - 10 });
         }
-        phrase
+        Phrase(digits)
     }
 
     pub(super) const fn secret(&self) -> &Secret {
@@ -160,6 +159,24 @@ impl fmt::Display for Uri<'_> {
         self.0.bytes.bytes().iter().try_for_each(|byte| write!(f, "{byte:02x}"))?;
         f.write_str(SUM_WORD)?;
         self.0.sum().iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// The pass-phrase of a [`Key`] for stations that speak MAVLink: 64 hexadecimal digits.
+pub struct Phrase([u8; 2 * KEY]);
+
+impl Phrase {
+    /// The digits.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        // They are.
+        core::str::from_utf8(&self.0).unwrap_or_default()
+    }
+}
+
+impl fmt::Display for Phrase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
     }
 }
 

@@ -106,7 +106,7 @@ pub use clock::MAX_AGE;
 pub use commands::Commands;
 pub use frame::{Kind, MAX_BODY, MAX_FRAME, MIN_FRAME, key_id, put};
 pub use guarded::{Guarded, Heard, NotTaken, Policy};
-pub use key::{Key, KeyError, Uri};
+pub use key::{Key, KeyError, Phrase, Uri};
 pub use payload::{Payload, Sample};
 pub use received::Received;
 pub use refused::{Refused, SealError, Tally};
