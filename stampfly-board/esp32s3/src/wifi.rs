@@ -22,7 +22,7 @@ use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
 use stampfly_board::link::Link;
 use stampfly_drivers::Timebase;
 use stampfly_link::Address;
-use stampfly_link::secure::Heard;
+use stampfly_link::secure::{Heard, MAX_FRAME};
 use stampfly_services::RadioDesk;
 use stampfly_services::association::{Association, Credentials, Event, State, Step};
 use stampfly_services::network::{self, Door, Routes, Stack};
@@ -185,6 +185,10 @@ impl Door for Behind {
             // A station asks again for what there is no room for.
             let _ = self.desk.borrow_mut().ask(now, &received.payload);
         }
+    }
+
+    fn offer<'r>(&self, room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
+        self.link.borrow().guarded.announcement(room)
     }
 }
 

@@ -229,6 +229,34 @@ fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
 }
 
 #[test]
+fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
+    let folder = folder("connect", "sealed_flood");
+    let ours = key(&folder, "ours", 1);
+    let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
+    let is_over = Arc::new(AtomicBool::new(false));
+    let flood = {
+        let (vehicle, is_over) = (vehicle.clone(), is_over.clone());
+        std::thread::spawn(move || {
+            let sockets: Vec<_> = (0..4).map(|_| UdpSocket::bind("127.0.0.1:0").expect("a port")).collect();
+            // An empty datagram asks for an offer; what is as long as a frame has to be looked at.
+            for bytes in [&[][..], &[1; 40]].iter().cycle().take_while(|_| !is_over.load(Ordering::Relaxed)) {
+                sockets.iter().for_each(|socket| _ = socket.send_to(bytes, &vehicle));
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        })
+    };
+    let begun = Instant::now();
+    let (_connected, mut socket) = connect(&folder, &format!("udp:{vehicle}"), &["--key", &ours]);
+    next(&mut socket, "event", is_up(true));
+    let joined = begun.elapsed();
+    assert!(joined < Duration::from_secs(10), "{joined:?}");
+    let read = ask(&mut socket, 1, json!({ "do": "param_get", "name": "eskf.gate" }));
+    assert_eq!((&read["ok"], &read["value"]), (&json!(true), &json!(4.0)));
+    is_over.store(true, Ordering::Relaxed);
+    flood.join().expect("a thread");
+}
+
+#[test]
 fn a_key_is_for_the_radio_and_the_radio_wants_one() {
     let folder = folder("connect", "keys");
     let ours = key(&folder, "ours", 1);

@@ -190,6 +190,11 @@ impl Guarded {
         self.vehicle.as_mut()?.transmit(now, random, room)
     }
 
+    /// The announcement in force, see [`Vehicle::announcement`].
+    pub fn announcement<'r>(&self, room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
+        self.vehicle.as_ref()?.announcement(room)
+    }
+
     /// The call for an unauthenticated transmitter, if one is wanted and due.
     pub fn beacon(&mut self, now: Instant) -> Option<[u8; PairingPacket::LENGTH]> {
         if self.policy.accept_unauthenticated { self.session.beacon(now) } else { None }

@@ -252,6 +252,12 @@ impl Vehicle {
             self.offer = Some(self.fresh(random)?);
         }
         self.announce_at = now + ANNOUNCEMENT_PERIOD;
+        self.announcement(room)
+    }
+
+    /// The announcement in force, for a sender that has just asked for it over a network: the same bytes for all, and nothing is noted of who asks. `None` while no session is
+    /// offered.
+    pub fn announcement<'r>(&self, room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
         let header = Header::of_number(Kind::Announcement, self.key.id(), self.offer?);
         // The same bytes whenever it is the same offer: one nonce never seals two texts.
         let length = header.seal(&self.handshake, Sender::Vehicle, Tick(0), room, |_| Ok(0)).ok()?;

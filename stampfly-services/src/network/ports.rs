@@ -3,7 +3,7 @@
 //! | port | who is answered |
 //! |---|---|
 //! | UDP [`MAVLINK_UDP`](super::MAVLINK_UDP), TCP [`MAVLINK_TCP`](super::MAVLINK_TCP) | whoever signs with the vehicle's key |
-//! | UDP [`SEALED_UDP`](super::SEALED_UDP) | whoever seals with it; an empty datagram asks for an offer of a session |
+//! | UDP [`SEALED_UDP`](super::SEALED_UDP) | a station that seals with it; an empty datagram asks for an offer of a session |
 //!
 //! Whoever connects to the stream is told the vehicle's state, signed, so that a station can take over the vehicle's time; it has to sign within
 //! [ten seconds](UNSIGNED), for there is one stream. Parameters are in MAVLink and in sealed frames. There is no command line but in
@@ -35,6 +35,9 @@ pub trait Door {
 
     /// Takes a sealed frame. What is refused is counted there.
     fn take(&mut self, now: Instant, source: Address, frame: &mut [u8]);
+
+    /// The offer of a session that is in force, for a sender that asks for it. `None` when there is none.
+    fn offer<'r>(&self, room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]>;
 }
 
 /// What is spoken at the ports.
@@ -102,9 +105,14 @@ impl<const ITEMS: usize> Ports<ITEMS> {
         let mut room = [0; MAX_FRAME];
         for _ in 0..SEALED_AT_ONCE {
             let Some((from, frame)) = ends.hear_sealed(&mut room) else { break };
-            let source = routes.source(now, from, door.station());
-            // What is shorter is no sealed frame, and would pass for a packet that authenticates nobody.
-            if frame.len() >= MIN_FRAME {
+            // What is shorter is no sealed frame, and would pass for a packet that authenticates nobody. An empty one asks for an offer, and is answered at once: nothing is noted of
+            // those who ask, so no number of them keeps a station out.
+            if frame.is_empty() {
+                if let Some(offer) = door.offer(&mut room) {
+                    ends.send_sealed(from, offer);
+                }
+            } else if frame.len() >= MIN_FRAME {
+                let source = routes.source(now, from, door.station());
                 door.take(now, source, frame);
             }
         }

@@ -39,13 +39,18 @@ impl Sealed {
     }
 
     /// Takes what has come.
-    pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>) {
+    pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>, put: Put<'_>) {
         if !controls.hands.radio.is_open() {
             return;
         }
         let (SocketAddr::V4(place), Some(link)) = (from.address, controls.hands.radio.link()) else { return };
-        let source = self.routes.source(now, place, link.guarded.station());
         let mut room = [0; MAX_FRAME];
+        // Nothing is noted of those who ask for an offer: no number of them keeps a station out.
+        if bytes.is_empty() {
+            link.guarded.announcement(&mut room).into_iter().for_each(|offer| put(&from, offer));
+            return;
+        }
+        let source = self.routes.source(now, place, link.guarded.station());
         let Some(frame) = room.get_mut(..bytes.len()).filter(|frame| frame.len() >= MIN_FRAME) else { return };
         frame.copy_from_slice(bytes);
         if let Ok(Heard::Authentic(received)) = link.guarded.receive_sealed(now, source, frame)

@@ -154,7 +154,7 @@ impl Link for Services<'_> {
                 self.seen.tape.borrow_mut().ask(now, from, false);
                 self.cables.retain(|(client, _)| *client != from);
             }
-            (SEALED, Heard::Bytes(bytes)) => self.sealed.hear(now, from, bytes, &mut self.controls),
+            (SEALED, Heard::Bytes(bytes)) => self.sealed.hear(now, from, bytes, &mut self.controls, put),
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             (_, heard) => {
                 let (desk, seen) = (self.desk(&newest), self.seen);

@@ -46,6 +46,10 @@ impl Door for Link {
             self.sticks.push(input);
         }
     }
+
+    fn offer<'r>(&self, room: &'r mut [u8; MAX_FRAME]) -> Option<&'r [u8]> {
+        self.guarded.announcement(room)
+    }
 }
 
 /// Everything that the firmware has at its network, and a computer.
