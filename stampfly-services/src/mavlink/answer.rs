@@ -7,7 +7,7 @@ use super::orders::say;
 use super::unreadable::Unreadable;
 use super::unserved::Unserved;
 use super::{parameters, streams, targets};
-use stampfly_link::mavlink::dialects::common::{LOG_ENTRY_DATA, MavMissionType, PING_DATA, TIMESYNC_DATA};
+use stampfly_link::mavlink::dialects::common::{LOG_ENTRY_DATA, MavMissionType, MavResult, PING_DATA, TIMESYNC_DATA};
 use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
 
@@ -17,6 +17,10 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
     message: &Heard,
 ) -> Option<Origin> {
     let (now, own, seat) = (turn.now, turn.own, turn.seat);
+    if turn.client.pulse.is_held() && is_an_order(message) {
+        late(turn, message);
+        return None;
+    }
     match message {
         Heard::Heartbeat => sign_of_life(turn),
         Heard::CommandLong(command) if own.is_meant(command.target_system, command.target_component) => {
@@ -91,6 +95,35 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
         _ => mission(turn, message),
     }
     None
+}
+
+/// Does it move the vehicle, or change how it flies? What ends a flight is done whatever its age.
+fn is_an_order(message: &Heard) -> bool {
+    match message {
+        Heard::CommandLong(command) => !commands::Command::from(command).ends_a_flight(),
+        Heard::CommandInt(command) => !commands::Command::from(command).ends_a_flight(),
+        Heard::SetPositionTargetLocalNed(_)
+        | Heard::SetPositionTargetGlobalInt(_)
+        | Heard::SetMode(_)
+        | Heard::ManualControl(_)
+        | Heard::MissionSetCurrent(_)
+        | Heard::ParamSet(_) => true,
+        _ => false,
+    }
+}
+
+/// Says that an order came too late to be carried out.
+fn late<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, message: &Heard) {
+    let Turn { own, client, asker, put, .. } = turn;
+    let (number, target) = match message {
+        Heard::CommandLong(command) => (command.command as u16, [command.target_system, command.target_component]),
+        Heard::CommandInt(command) => (command.command as u16, [command.target_system, command.target_component]),
+        _ => return client.complain(Unserved::Late, &"it was held up on its way", put),
+    };
+    if own.is_meant(target[0], target[1]) {
+        client.complain(Unserved::Late, &"it was held up on its way", put);
+        commands::acknowledge(client, number, asker, (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, 0), put);
+    }
 }
 
 /// The messages of the mission protocol.

@@ -2,13 +2,15 @@
 
 use super::heard::Heard;
 use super::identity::{AUTOPILOT, Own};
+use super::pulse::Pulse;
 use super::said::Said;
 use super::streams::STREAMS;
 use super::unreadable::Unreadable;
 use super::unserved::Told;
 use crate::refusal::Connection;
 use crate::view::View;
-use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity, STATUSTEXT_DATA};
+use stampfly_link::mavlink::MessageData as _;
+use stampfly_link::mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage, MavSeverity, STATUSTEXT_DATA};
 use stampfly_link::mavlink::signing::{Signer, SigningKey, Untrusted, Verifier};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
 use stampfly_types::{Duration, Instant};
@@ -60,6 +62,7 @@ pub(super) struct Client<C> {
     /// The number of its connection, once it has said something.
     pub connection: Option<Connection>,
     pub heard: Instant,
+    pub pulse: Pulse,
     /// It is sent to although it says nothing.
     pub stays: bool,
     /// It has sent a frame that was believed.
@@ -88,6 +91,7 @@ impl<C> Client<C> {
             id,
             connection: None,
             heard: now,
+            pulse: Pulse::new(),
             stays,
             believed: false,
             now,
@@ -148,6 +152,7 @@ impl<C> Client<C> {
             }
         }
         (self.believed, self.heard) = (true, self.now);
+        self.pulse.hear(self.now, frame.id == HEARTBEAT_DATA::ID);
         let sender = [frame.system, frame.component];
         if frame.id == Tunnel::ID {
             return Some(Fed::Tunnel(sender, Tunnel::read(frame.payload)?));

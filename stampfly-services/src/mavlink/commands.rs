@@ -62,6 +62,17 @@ impl From<&COMMAND_INT_DATA> for Command {
     }
 }
 
+impl Command {
+    /// Landing, disarming, motors off.
+    pub fn ends_a_flight(&self) -> bool {
+        match self.kind {
+            MavCmd::MAV_CMD_NAV_LAND | MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => true,
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.parameters.first().is_some_and(|arms| *arms == 0.0),
+            _ => false,
+        }
+    }
+}
+
 /// A whole number in a parameter, which MAVLink has as a float: as large as a float still tells apart from the next.
 fn whole(number: f32) -> Option<u32> {
     (number.is_finite() && (0.0..=16_777_215.0).contains(&number)).then_some(number as u32)

@@ -6,6 +6,7 @@
 //! | `client.rs` | one client: what it was heard to send, what it wants and how often, whether it must sign |
 //! | `heard.rs`, `said.rs` | the messages that a vehicle takes, and those that it sends: a few of the dialect's two hundred |
 //! | `answer.rs` | which message goes where |
+//! | `pulse.rs` | whether what comes now was held up on its way |
 //! | `streams.rs` | what is sent by itself: the messages that are made of a [`View`](crate::View) |
 //! | `commands.rs` | commands, and what becomes of each |
 //! | `orders.rs` | those that change the vehicle's state, until it is seen that they have happened |
@@ -40,6 +41,7 @@ mod leading;
 mod missions;
 mod orders;
 mod parameters;
+mod pulse;
 mod said;
 mod streams;
 mod targets;

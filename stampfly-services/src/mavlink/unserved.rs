@@ -23,10 +23,12 @@ pub(super) enum Unserved {
     Sticks,
     Mode,
     Parameter,
+    /// What was held up on its way.
+    Late,
 }
 
 /// Kinds that there are.
-const KINDS: usize = Unserved::Parameter as usize + 1;
+const KINDS: usize = Unserved::Late as usize + 1;
 
 impl Unserved {
     const fn name(self) -> &'static str {
@@ -38,6 +40,7 @@ impl Unserved {
             Self::Sticks => "sticks not flown",
             Self::Mode => "mode not set",
             Self::Parameter => "no such parameter",
+            Self::Late => "expired, not done",
         }
     }
 }

@@ -361,6 +361,31 @@ fn the_commander_is_a_connection_and_not_a_number() {
 }
 
 #[test]
+fn a_command_that_a_network_has_held_up_is_refused_and_what_ends_a_flight_is_done() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    let hold = command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]);
+    let land = command(MavCmd::MAV_CMD_NAV_LAND, [0.0; 7]);
+    let mut ms = 0;
+    for held in [1_500, 5_000, 20_000] {
+        for _ in 0..5 {
+            station.asks(Instant::from_millis(ms), &mut mavlink, &mut vehicle, &heartbeat);
+            ms += 1_000;
+        }
+        ms += held - 1_000;
+        let answers = station.asks(Instant::from_millis(ms), &mut mavlink, &mut vehicle, &hold);
+        assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED), "held for {held} ms");
+        let texts = answers.iter().filter(|answer| matches!(answer, MavMessage::STATUSTEXT(_))).count();
+        assert_eq!((texts, vehicle.guided.len()), (1, 0), "it is said and not done");
+        station.asks(Instant::from_millis(ms + 10), &mut mavlink, &mut vehicle, &land);
+        assert_eq!(vehicle.guided.drain(..).count(), 1, "it lands");
+        ms += 500;
+        station.asks(Instant::from_millis(ms), &mut mavlink, &mut vehicle, &hold);
+        assert_eq!(vehicle.guided.drain(..).count(), 1, "what comes after that is fresh");
+    }
+}
+
+#[test]
 fn what_the_vehicle_has_said_itself_does_not_come_back() {
     let key = SigningKey::from_passphrase("a phrase");
     let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key, 1_000), Vehicle::standing());
