@@ -138,6 +138,12 @@ impl<V: Vehicle, S: Sink> Recorder<V, S> {
         self.written.as_ref()
     }
 
+    /// The same, to keep.
+    #[must_use]
+    pub fn into_written(self) -> Option<S> {
+        self.written
+    }
+
     /// Messages that the sink has refused so far.
     #[must_use]
     pub fn refused(&self) -> u32 {

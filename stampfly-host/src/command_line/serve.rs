@@ -10,9 +10,10 @@ use crate::flown::{Flown, fly};
 use crate::ground::{self, Client, Event, Hub, Limits, Server, VehicleCard, Watch};
 use crate::log_file::LogFile;
 use crate::recorder::Recorder;
-use crate::serve::{Key, OpenPorts, Page, PortOption, RecordOut};
+use crate::serve::{Armed, ArmedWitness, FlightLog, Key, OpenPorts, Page, PortOption, RecordOut};
 use crate::vehicles::{self, ForVehicle};
 use serde_json::Value;
+use stampfly_bus::{Schedule, TopicTable};
 use stampfly_sim::vehicle::{Live, Options, Speed, Transport, Vehicle, Verdict};
 use stampfly_types::Duration;
 use std::net::{Ipv6Addr, SocketAddr};
@@ -24,6 +25,8 @@ use std::thread;
 
 /// A log of more bytes has no report: a browser would not open it. Some ten minutes of one vehicle.
 const LARGEST_REPORT: u64 = 300_000_000;
+/// A log of one vehicle has so many bytes at most: an hour in the air.
+const LARGEST_LOG: u64 = 2_000_000_000;
 /// As good as for ever, s: a year.
 const FOR_EVER: u64 = 365 * 86_400;
 /// Vehicles stand side by side in rows of so many, so far apart, m.
@@ -214,10 +217,11 @@ struct Flight<'s, V: Vehicle> {
     ports: &'s Arc<OpenPorts>,
     hub: &'s Hub,
     setup: V::Setup,
-    recorder: Recorder<V, LogFile>,
+    recorder: Recorder<V, FlightLog>,
     log: PathBuf,
     watch: Watch,
     record: RecordOut,
+    armed: ArmedWitness,
 }
 
 impl<'s, V: Vehicle> Flight<'s, V> {
@@ -255,11 +259,12 @@ impl<'s, V: Vehicle> Flight<'s, V> {
             ("seed".to_owned(), (options.seed + number as u64).to_string()),
             ("mission".to_owned(), "other programs".to_owned()),
         ];
+        let armed = Armed::default();
         let so_far = file.clone();
         hub.provide_log(number, move || so_far.so_far());
         let watch = hub.witness(number).ok_or("the ground station does not know this vehicle")?;
-        let recorder =
-            Recorder::with_sink(file, &setup, &facts).map_err(|error| format!("{}: {error:?}", log.display()))?;
+        let recorder = Recorder::with_sink(FlightLog::new(file, armed.clone(), LARGEST_LOG), &setup, &facts)
+            .map_err(|error| format!("{}: {error:?}", log.display()))?;
         let record = options.record.map_or_else(
             || Ok(RecordOut::nowhere()),
             |to| {
@@ -267,24 +272,27 @@ impl<'s, V: Vehicle> Flight<'s, V> {
                 RecordOut::datagrams(V::NAME, (to.ip(), port).into()).map_err(|error| format!("{to}: {error}"))
             },
         )?;
-        Ok(Self { options, number, ports, hub, setup, recorder, log, watch, record })
+        let armed = armed.witness(<<V::Runnables as Schedule>::Topics as TopicTable>::TOPICS);
+        Ok(Self { options, number, ports, hub, setup, recorder, log, watch, record, armed })
     }
 
     /// Flies, again after each restart that somebody asks the vehicle for.
     fn fly_all(self) -> Result<Vec<Over<V>>, String> {
         let (mut over, mut next) = (Vec::new(), Some(self));
         while let Some(flight) = next.take() {
-            let Self { options, number, ports, hub, setup, recorder, log, watch, record } = flight;
-            let mut witnesses = (recorder, (watch, record));
+            let Self { options, number, ports, hub, setup, recorder, log, watch, record, armed } = flight;
+            let mut witnesses = (recorder, (armed, (watch, record)));
             let flown = fly::<V>(&setup, &mut witnesses, &mut |_, _| {});
             let (recorder, _) = witnesses;
-            // The page may still hold the file.
-            _ = recorder.written().map(LogFile::flush);
+            let hash = recorder.hash();
+            if let Some(Err(error)) = recorder.into_written().map(FlightLog::finish) {
+                eprintln!("stampfly: {}: {error}", log.display());
+            }
             if let Some(setup) = V::again(&setup, &flown.outcome) {
                 next = Some(Self::prepare(options, number, ports, hub, setup, over.len() + 1)?);
                 ports.reopen();
             }
-            over.push((flown, recorder.hash(), log));
+            over.push((flown, hash, log));
         }
         Ok(over)
     }
