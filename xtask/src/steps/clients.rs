@@ -35,7 +35,7 @@ const SCRIPTS: [Script; 15] = [
     ("mavlink_square.py", &["udpin:{mavlink-udp}"], &[]),
     ("mavlink_square.py", &["{usb}"], &[]),
     ("mavlink_calibrate.py", &["tcp:{mavlink-tcp}"], &[]),
-    ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{key}"], &["--key", "{key}", "--sign-all", "--port", "sealed=0"]),
+    ("mavlink_signed.py", &["tcp:{mavlink-tcp}", "{phrase}"], &["--key", "{key}", "--sign-all", "--port", "sealed=0"]),
     ("yamspy_tune.py", &["{msp-serial}"], &[]),
     ("read_streams.py", &["{telemetry#}", "{stream}"], &[]),
     ("console.py", &["{console}"], &[]),
