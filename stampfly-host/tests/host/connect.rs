@@ -182,7 +182,7 @@ fn a_flight_is_recorded_over_the_line_and_replays_bit_for_bit_around_parameters_
 
 /// Flies a hop that is recorded over the line to that place, and replays it.
 pub fn recorded(folder: &Path, place: &str, more: &[&str]) {
-    let arguments = [&["--record", "flight.sfr", "--for", "30"], more].concat();
+    let arguments = [&["--record", "flight.sfr", "--for", "120"], more].concat();
     let (mut connected, mut socket) = connect(folder, place, &arguments);
     next(&mut socket, "event", is_up(true));
     // Calibrated, and nobody has asked for anything yet.
