@@ -105,6 +105,8 @@ pub const PERIOD: Duration = Duration::from_millis(5);
 /// Ticks between two turns of the services that send by themselves: 20 ms.
 pub const TURN: u32 = 4;
 
+/// Clients of MAVLink at once: more than a TCP port takes, so that those that only listen there keep no datagrams out.
+const CLIENTS: usize = 48;
 /// Asks of pages that wait to be seen done. More are answered at once.
 const WAITS: usize = 64;
 
@@ -133,7 +135,7 @@ pub struct About {
 pub struct Ground<H> {
     about: About,
     identity: Identity,
-    mavlink: Mavlink<Client>,
+    mavlink: Mavlink<Client, CLIENTS>,
     msp: Vec<(Client, Msp)>,
     helm: Helm,
     places: Places,
@@ -168,9 +170,9 @@ impl<H: Hands> Ground<H> {
             identity,
             mavlink: match live.ports.signing() {
                 Some(signing) => {
-                    Mavlink::new(identity).with_key(SigningKey::from_passphrase(&signing.phrase), signing.time)
+                    Mavlink::for_clients(identity).with_key(SigningKey::from_passphrase(&signing.phrase), signing.time)
                 }
-                None => Mavlink::new(identity),
+                None => Mavlink::for_clients(identity),
             },
             msp: Vec::new(),
             helm: Helm::new(),

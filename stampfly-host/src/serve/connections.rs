@@ -49,6 +49,8 @@ type Told = Box<dyn Fn(Ended) + Send + Sync>;
 #[derive(Default)]
 pub(super) struct Connections {
     queues: Mutex<HashMap<Client, Queue>>,
+    /// Connections that have come, and that were ended.
+    begun: AtomicU64,
     ended: AtomicU64,
     told: OnceLock<Told>,
 }
@@ -57,6 +59,9 @@ pub(super) struct Connections {
 #[derive(Debug)]
 struct Queue {
     bytes: SyncSender<Vec<u8>>,
+    /// The how many-th it is, and whether it has shown that it speaks the port's language.
+    number: u64,
+    is_shown: bool,
     /// Is what finds no room lost? A serial line stays, whether or not a program reads there.
     stays: bool,
 }
@@ -95,7 +100,7 @@ impl Connections {
     #[cfg(unix)]
     pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
         let (queue, waiting) = sync_channel(WAITING);
-        self.queues().insert(client, Queue { bytes: queue, stays: true });
+        self.queues().insert(client, Queue { bytes: queue, number: 0, is_shown: true, stays: true });
         waiting
     }
 
@@ -121,10 +126,10 @@ impl Connections {
             .and_then(|()| stream.set_read_timeout(Some(POLL)))
             .and_then(|()| stream.set_write_timeout(Some(20 * POLL)))
             .and_then(|()| stream.try_clone());
-        let at_port = all.keys().filter(|other| other.port == client.port).count();
         // One that is refused sees its connection closed.
-        let Some(writer) = prepared.ok().filter(|_| at_port < MOST) else { return };
-        all.insert(client, Queue { bytes: queue, stays: false });
+        let Some(writer) = prepared.ok().filter(|_| has_room(&mut all, client.port)) else { return };
+        let number = self.begun.fetch_add(1, Ordering::Relaxed);
+        all.insert(client, Queue { bytes: queue, number, is_shown: false, stays: false });
         drop(all);
         let (connections, events) = (Arc::clone(self), events.clone());
         std::thread::spawn(move || write(writer, &waiting));
@@ -143,9 +148,28 @@ impl Connections {
         self.queues().keys().copied().collect()
     }
 
+    /// This one speaks the language of its port.
+    fn show(&self, client: &Client) {
+        if let Some(queue) = self.queues().get_mut(client) {
+            queue.is_shown = true;
+        }
+    }
+
     fn has(&self, client: &Client) -> bool {
         self.queues().contains_key(client)
     }
+}
+
+/// Is there room for another connection to this port? Of too many, the oldest that has shown nothing makes room: who only listens may, but keeps no
+/// program out.
+fn has_room(all: &mut HashMap<Client, Queue>, port: usize) -> bool {
+    let at_port = all.iter().filter(|(client, _)| client.port == port);
+    if at_port.clone().count() < MOST {
+        return true;
+    }
+    let silent = at_port.filter(|(_, queue)| !queue.is_shown).min_by_key(|(_, queue)| queue.number);
+    let oldest = silent.map(|(client, _)| *client);
+    oldest.is_some_and(|client| all.remove(&client).is_some())
 }
 
 /// Reads until the connection is over.
@@ -160,12 +184,15 @@ fn read(
     events: &Events,
 ) -> Result<(), Foreign> {
     let (mut part, mut greeting) = ([0; PART], Greeting::new(spec.speech));
-    let mut heard = Ok(());
+    let (mut heard, mut is_shown) = (Ok(()), false);
     while heard.is_ok() && events.are_open() && connections.has(&client) {
         match stream.read(&mut part) {
             Ok(0) => break,
             Ok(length) => {
                 heard = greeting.hear(part.get(..length).unwrap_or_default()).map(|bytes| {
+                    if greeting.is_shown() && !core::mem::replace(&mut is_shown, true) {
+                        connections.show(&client);
+                    }
                     // Waits while the flight has much to hear: the sender is held up, not the flight.
                     if !bytes.is_empty() {
                         events.put(client, Heard::Bytes(&bytes));

@@ -90,6 +90,11 @@ impl Greeting {
         Self { proof, begun: Vec::new() }
     }
 
+    /// Has it shown the port's language?
+    pub const fn is_shown(&self) -> bool {
+        matches!(self.proof, Proof::Shown)
+    }
+
     /// Takes the next bytes, and hands over those that may be obeyed: a first frame when it is whole, a first line key by key, and then
     /// everything.
     ///

@@ -366,3 +366,28 @@ impl Ports for OpenPorts {
         !self.events.are_open()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_that_another_program_has_is_missed_unless_it_is_named() {
+        let taken = UdpSocket::bind("127.0.0.1:0").expect("a port");
+        let number = taken.local_addr().expect("an address").port();
+        let ports: &[_] = Box::leak(Box::new([PortSpec::udp("taken", number, ""), PortSpec::udp("free", 0, "")]));
+        let opened = OpenPorts::open(ports, &[], 0, None).expect("it flies without");
+        assert_eq!((opened.missed().len(), opened.places().len()), (1, 1));
+        assert!(opened.missed()[0].to_string().contains("'taken'"));
+        let named = [format!("taken={number}").parse().expect("an option")];
+        assert!(OpenPorts::open(ports, &named, 0, None).is_err());
+    }
+
+    #[test]
+    fn a_port_that_is_for_when_it_is_wanted_is_closed_until_it_is_named() {
+        let ports: &[_] = Box::leak(Box::new([PortSpec { when_named: true, ..PortSpec::udp("wanted", 0, "") }]));
+        assert_eq!(OpenPorts::open(ports, &[], 0, None).expect("open").places().len(), 0);
+        let named = ["wanted=0".parse().expect("an option")];
+        assert_eq!(OpenPorts::open(ports, &named, 0, None).expect("open").places().len(), 1);
+    }
+}

@@ -11,6 +11,7 @@ mod connect_radio;
 mod controllers;
 mod determinism;
 mod doctor;
+mod doors;
 mod estimate;
 mod fault_campaign;
 mod faults;
