@@ -1,11 +1,11 @@
 //! The little HTTP that the page needs, as functions over bytes: no sockets here.
 //!
-//! Use [`request`] on what has arrived so far, until it gives something. It accepts three things: the page, a log, and the
-//! handshake of a WebSocket (RFC 6455 section 4.2). Everything else is a [`Refusal`]. Not a general server: no bodies, no
-//! encodings, one request a connection.
+//! Use [`request`] on what has arrived so far, until it gives something. It accepts three things:
+//! the page, a log, and the handshake of a WebSocket (RFC 6455 section 4.2). Everything else is a
+//! [`Refusal`]. Not a general server: no bodies, no encodings, one request a connection.
 //!
-//! What a page of somebody else's must not do from the same browser is refused here: a `Host` that is a name (DNS
-//! rebinding needs one), and an `Origin` that is not this very server.
+//! What a page of somebody else's must not do from the same browser is refused here: a `Host` that
+//! is a name (DNS rebinding needs one), and an `Origin` that is not this very server.
 
 use std::fmt;
 use std::net::IpAddr;
@@ -176,7 +176,8 @@ pub fn request(bytes: &[u8], hosts: Hosts) -> Result<Option<Request>, Refusal> {
         "/ws" => Wanted::Socket(headers.socket_key().ok_or(Refusal::NotWebSocket)?.to_owned()),
         _ => path.strip_prefix("/log/").and_then(number).map(Wanted::Log).ok_or(Refusal::NotFound)?,
     };
-    // A person may come from anywhere. What only the page itself needs, no other page may have fetched, nor an image in one.
+    // A person may come from anywhere. What only the page itself needs, no other page may have
+    // fetched, nor an image in one.
     let site = headers.only("Sec-Fetch-Site").map_err(|_| Refusal::ForeignOrigin)?;
     if wanted != Wanted::Page && site.is_some_and(|site| !matches!(site, "same-origin" | "none")) {
         return Err(Refusal::ForeignOrigin);
@@ -275,8 +276,8 @@ pub fn refuse(refusal: Refusal) -> String {
     head(refusal.status(), "text/plain; charset=utf-8", body.len() as u64, extra) + &body
 }
 
-/// The answer to a WebSocket's handshake, with what follows from the client's key (RFC 6455 section 4.2.2, 5.4), which libraries of
-/// WebSockets compute.
+/// The answer to a WebSocket's handshake, with what follows from the client's key (RFC 6455 section
+/// 4.2.2, 5.4), which libraries of WebSockets compute.
 #[must_use]
 pub fn upgrade(accept: &str) -> String {
     format!(

@@ -1,8 +1,10 @@
-//! What flights and sockets share: cards, newest samples, asks on their way to a vehicle, answers on their way to a page.
+//! What flights and sockets share: cards, newest samples, asks on their way to a vehicle, answers
+//! on their way to a page.
 //!
-//! A flight's thread uses [`Hub::witness`], [`Hub::asks`], [`Hub::answer`], [`Hub::tell_all`] and [`Hub::provide_log`]; none
-//! of them waits for a socket. Time is the server's clock, an argument: a browser has another than a computer. Every queue is bounded: a vehicle that does not look is sent no more asks, a client that does
-//! not read its answers is cut off.
+//! A flight's thread uses [`Hub::witness`], [`Hub::asks`], [`Hub::answer`], [`Hub::tell_all`] and
+//! [`Hub::provide_log`]; none of them waits for a socket. Time is the server's clock, an argument:
+//! a browser has another than a computer. Every queue is bounded: a vehicle that does not look is
+//! sent no more asks, a client that does not read its answers is cut off.
 //!
 //! ```
 //! use stampfly_board::simulation::StampFly;
@@ -48,8 +50,9 @@ const TEXTS: usize = 512;
 /// Events that a page which comes later is told.
 const EVENTS: usize = 64;
 
-/// What is older when the vehicle is to carry it out is refused: a person who has clicked has seen by then that nothing came of it. Half of a second for a
-/// network that is slow, and as much for a flight that is.
+/// What is older when the vehicle is to carry it out is refused: a person who has clicked has seen
+/// by then that nothing came of it. Half of a second for a network that is slow, and as much for a
+/// flight that is.
 pub const FRESH: Duration = Duration::from_secs(1);
 /// A page whose clock is ahead of the server's by more counts wrongly.
 const AHEAD: Duration = Duration::from_millis(100);
@@ -230,20 +233,23 @@ impl Hub {
         self.vehicles.len()
     }
 
-    /// Keeps the newest samples of this vehicle for the pages; `None` when there is no such vehicle.
+    /// Keeps the newest samples of this vehicle for the pages; `None` when there is no such
+    /// vehicle.
     #[must_use]
     pub fn witness(&self, vehicle: usize) -> Option<Watch> {
         Some(Watch(self.vehicles.get(vehicle)?.newest.clone()))
     }
 
-    /// The topics of this vehicle, by their places in its card, that pages have looked for since the last call.
+    /// The topics of this vehicle, by their places in its card, that pages have looked for since
+    /// the last call.
     #[must_use]
     pub fn looked_at(&self, vehicle: usize) -> Vec<usize> {
         self.vehicles.get(vehicle).map(|shared| shared.newest.looked()).unwrap_or_default()
     }
 
-    /// What this vehicle has been asked since the last call, oldest first, with who asked. Of a client's sticks only the
-    /// newest are left where nothing else came between. What has become [late](FRESH) meanwhile is refused here, and is not among them.
+    /// What this vehicle has been asked since the last call, oldest first, with who asked. Of a
+    /// client's sticks only the newest are left where nothing else came between. What has become
+    /// [late](FRESH) meanwhile is refused here, and is not among them.
     #[must_use]
     pub fn asks(&self, vehicle: usize, now: Duration) -> Vec<(Client, Asked)> {
         let Some(shared) = self.vehicles.get(vehicle) else { return Vec::new() };
@@ -255,7 +261,8 @@ impl Hub {
         fresh.into_iter().map(|Waiting { client, asked, .. }| (client, asked)).collect()
     }
 
-    /// Clients that have gone since the last call. What they have asked before is among the asks of a call before this one.
+    /// Clients that have gone since the last call. What they have asked before is among the asks of
+    /// a call before this one.
     #[must_use]
     pub fn gone(&self, vehicle: usize) -> Vec<Client> {
         self.vehicles.get(vehicle).map(|shared| core::mem::take(&mut *lock(&shared.gone))).unwrap_or_default()
@@ -271,7 +278,8 @@ impl Hub {
         self.send(client, &reply_text(vehicle, id, answer));
     }
 
-    /// Sends a client a text that is JSON already, such as [`Asked::answered`]. One that has gone gets nothing.
+    /// Sends a client a text that is JSON already, such as [`Asked::answered`]. One that has gone
+    /// gets nothing.
     pub fn send(&self, client: Client, text: &str) {
         let clients = lock(&self.clients);
         if let Some(outbox) = clients.iter().find(|outbox| outbox.client() == client) {
@@ -279,7 +287,8 @@ impl Hub {
         }
     }
 
-    /// Tells all pages, and those that come later as far as it is among the last sixty-four events. A parameter's new value is on the card from now on.
+    /// Tells all pages, and those that come later as far as it is among the last sixty-four events.
+    /// A parameter's new value is on the card from now on.
     pub fn tell_all(&self, vehicle: usize, event: &Event) {
         let Some(shared) = self.vehicles.get(vehicle) else { return };
         if let Event::Parameter { name, value } = event {
@@ -325,7 +334,8 @@ impl Hub {
         self.vehicles.get(vehicle).map_or(0, |shared| shared.sticks_lost.load(Ordering::Relaxed))
     }
 
-    /// A client has come that can come again: who knows this session, which is random, is the same client.
+    /// A client has come that can come again: who knows this session, which is random, is the same
+    /// client.
     pub fn connect_as(self: &Arc<Self>, session: &str) -> Connection {
         let connection = self.connect();
         let mut sessions = lock(&self.sessions);
@@ -337,8 +347,8 @@ impl Hub {
         connection
     }
 
-    /// The client of this session has come again, by this connection. Its connection before, if there still is one, is cut off. `false` when no
-    /// such session is known.
+    /// The client of this session has come again, by this connection. Its connection before, if
+    /// there still is one, is cut off. `false` when no such session is known.
     pub fn resume(&self, connection: &Connection, session: &str) -> bool {
         let sessions = lock(&self.sessions);
         let Some((_, client)) = sessions.iter().find(|(known, _)| **known == *session) else { return false };
@@ -477,7 +487,8 @@ impl Connection {
         lock(&self.outbox.texts).drain(..).collect()
     }
 
-    /// Has something been lost, because nobody took it? Then it has to be cut off: an answer must not be missing unnoticed.
+    /// Has something been lost, because nobody took it? Then it has to be cut off: an answer must
+    /// not be missing unnoticed.
     #[must_use]
     pub fn has_overflown(&self) -> bool {
         self.outbox.overflown.load(Ordering::Relaxed)

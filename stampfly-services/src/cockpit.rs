@@ -1,8 +1,9 @@
 //! What a service sees of a vehicle, and what it may ask for.
 //!
-//! A vehicle implements [`Cockpit`] on a struct that borrows what is needed: where the newest samples are kept, the
-//! publishers of its commands, its parameters. Whether a command is obeyed is the mode machine's decision, and seen in the
-//! [`view`](Cockpit::view); a [`Refusal`] says that it did not even get there.
+//! A vehicle implements [`Cockpit`] on a struct that borrows what is needed: where the newest
+//! samples are kept, the publishers of its commands, its parameters. Whether a command is obeyed is
+//! the mode machine's decision, and seen in the [`view`](Cockpit::view); a [`Refusal`] says that it
+//! did not even get there.
 
 use crate::helm::Told;
 use crate::lease::is_sane;
@@ -57,7 +58,8 @@ pub trait Cockpit {
     /// A connection has ended, or a page is gone: these do not sit there any more.
     fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool);
 
-    /// What was asked of the vehicle after this number, and by whom: to be told to everybody. Begin with 0.
+    /// What was asked of the vehicle after this number, and by whom: to be told to everybody. Begin
+    /// with 0.
     fn told(&self, _after: u32) -> Option<(u32, Told)> {
         None
     }

@@ -1,7 +1,8 @@
 //! What a command asks of a vehicle, and when it is seen to have happened.
 //!
-//! A command that has reached the vehicle may still be refused by its mode machine. Services look at the [state](crate::View::state) that it publishes before they
-//! say that something is done: mostly one or two control cycles later.
+//! A command that has reached the vehicle may still be refused by its mode machine. Services look
+//! at the [state](crate::View::state) that it publishes before they say that something is done:
+//! mostly one or two control cycles later.
 //!
 //! | asked for | has happened when |
 //! |---|---|
@@ -20,7 +21,8 @@ use core::fmt;
 use stampfly_types::messages::{ArmBlocks, CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant};
 
-/// A vehicle that has not done it after this long does not. Programs send a command again after half a second, and three times in all.
+/// A vehicle that has not done it after this long does not. Programs send a command again after
+/// half a second, and three times in all.
 pub const SOON: Duration = Duration::from_millis(1_500);
 
 /// The vehicle's state says no more.
@@ -141,7 +143,8 @@ fn is_led(status: &FlightStatus) -> bool {
 }
 
 impl Deed {
-    /// Says why a vehicle in this state does not do it, as far as that is known before it is asked. `false` when nothing speaks against it.
+    /// Says why a vehicle in this state does not do it, as far as that is known before it is asked.
+    /// `false` when nothing speaks against it.
     pub fn refuse(self, status: &FlightStatus, words: &mut dyn fmt::Write) -> bool {
         // That a program is there, the command itself shows.
         let blocks = status.blocks.without(ArmBlocks::NO_LINK);

@@ -1,7 +1,9 @@
-//! The part of a [`Cockpit`] that is the same for every vehicle: who commands, and what everybody is told of it.
+//! The part of a [`Cockpit`] that is the same for every vehicle: who commands, and what everybody
+//! is told of it.
 //!
-//! A vehicle implements [`Hands`]: how its commands and sticks are published, where its parameters are, what its board does. [`Seated`] is its cockpit for one
-//! call of a service, in firmware and in simulation alike.
+//! A vehicle implements [`Hands`]: how its commands and sticks are published, where its parameters
+//! are, what its board does. [`Seated`] is its cockpit for one call of a service, in firmware and
+//! in simulation alike.
 
 use crate::cockpit::{Cockpit, Request, fly_to};
 use crate::lease::Lease;
@@ -22,7 +24,8 @@ pub trait Hands {
     /// Publishes a command.
     ///
     /// # Errors
-    /// [`Refusal::Full`] when there is no room for it, [`Refusal::Unsupported`] of a vehicle that takes commands from its transmitter alone.
+    /// [`Refusal::Full`] when there is no room for it, [`Refusal::Unsupported`] of a vehicle that
+    /// takes commands from its transmitter alone.
     fn command(&mut self, now: Instant, command: GuidedCommand) -> Result<(), Refusal>;
 
     /// Publishes sticks.
@@ -39,13 +42,15 @@ pub trait Hands {
         None
     }
 
-    /// What a board does. An armed vehicle is asked for nothing but to stop a motor, or to end a calibration.
+    /// What a board does. An armed vehicle is asked for nothing but to stop a motor, or to end a
+    /// calibration.
     ///
     /// # Errors
     /// When it does not do that, or not with these numbers.
     fn request(&mut self, now: Instant, request: Request) -> Result<(), Refusal>;
 
-    /// Called with every [`Helm::poll`]: publishes what was changed of the parameters and may be in use now, takes over what others have changed. Nothing by default.
+    /// Called with every [`Helm::poll`]: publishes what was changed of the parameters and may be in
+    /// use now, takes over what others have changed. Nothing by default.
     fn poll(&mut self, _now: Instant, _armed: bool) {}
 }
 
@@ -121,7 +126,8 @@ impl Helm {
         self.lease.holder(now)
     }
 
-    /// What is to be done now and then, whichever programs are connected: call it at least every 100 ms.
+    /// What is to be done now and then, whichever programs are connected: call it at least every
+    /// 100 ms.
     pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {
         if !armed {
             self.lease.release();

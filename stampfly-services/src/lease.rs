@@ -1,21 +1,25 @@
 //! One program at a time commands a vehicle.
 //!
-//! Several may be connected: a ground station that watches, a script that flies. The first that asks for anything has the lease
-//! as long as it is heard; the others are told who has it. A kill is everybody's at any time, and so is landing. When the holder falls
-//! silent or its connection ends, the vehicle's own failsafe acts, and another program may take the lease with a command. Sticks of a program obey the
-//! same rule, but do not take the lease of a flight: some are sent as long as a page is open. A transmitter's sticks do not come
-//! here: what they do is the mode machine's decision (`stampfly-mode`), and they win.
+//! Several may be connected: a ground station that watches, a script that flies. The first that
+//! asks for anything has the lease as long as it is heard; the others are told who has it. A kill
+//! is everybody's at any time, and so is landing. When the holder falls silent or its connection
+//! ends, the vehicle's own failsafe acts, and another program may take the lease with a command.
+//! Sticks of a program obey the same rule, but do not take the lease of a flight: some are sent as
+//! long as a page is open. A transmitter's sticks do not come here: what they do is the mode
+//! machine's decision (`stampfly-mode`), and they win.
 
 use crate::refusal::{Refusal, Seat};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant};
 
-/// A holder who was not heard for this long has lost it. Ground stations send a heartbeat a second, and the protocol's custom is
-/// to allow three to five to be lost.
+/// A holder who was not heard for this long has lost it. Ground stations send a heartbeat a second,
+/// and the protocol's custom is to allow three to five to be lost.
 pub const SILENCE: Duration = Duration::from_secs(3);
-/// A vehicle without a pilot takes a link for lost after half a second: signs of life are passed on so often.
+/// A vehicle without a pilot takes a link for lost after half a second: signs of life are passed on
+/// so often.
 pub const LIFE: Duration = Duration::from_millis(100);
-/// Largest number in a command: metres, metres a second, radians, seconds. A vehicle of this kind does not go farther.
+/// Largest number in a command: metres, metres a second, radians, seconds. A vehicle of this kind
+/// does not go farther.
 const LARGEST: f32 = 1_000.0;
 
 /// Are all its numbers such that a vehicle can mean something by them?
@@ -45,14 +49,14 @@ pub struct Lease {
     holder: Option<Seat>,
     /// Its connection has ended.
     has_left: bool,
-    /// Of the holder; without one, of anybody.
+    /// When the holder was heard last; without a holder, any program.
     heard: Option<Instant>,
     /// When a sign of life was passed on.
     passed: Option<Instant>,
 }
 
 impl Lease {
-    /// Nobody commands.
+    /// No program commands.
     #[must_use]
     pub const fn new() -> Self {
         Self { holder: None, has_left: false, heard: None, passed: None }
@@ -76,7 +80,8 @@ impl Lease {
         self.holder.is_none_or(|holder| holder == seat)
     }
 
-    /// May this be passed on to the vehicle? A program that asks for more than a kill has the lease then.
+    /// May this be passed on to the vehicle? A program that asks for more than a kill has the lease
+    /// then.
     ///
     /// # Errors
     /// When another program has it, or a number is none.
@@ -112,13 +117,15 @@ impl Lease {
         }
     }
 
-    /// Its connection has ended. Another may take the lease at once; until one does, the vehicle's failsafe hears nothing.
+    /// Its connection has ended. Another may take the lease at once; until one does, the vehicle's
+    /// failsafe hears nothing.
     pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
         self.has_left |= self.holder.is_some_and(has_left);
     }
 
-    /// A program is there. While a vehicle is commanded, only its commander's signs of life count, also after a silence: the
-    /// vehicle's failsafe has to notice that the commander is gone, however many watch. Before there is one, every program's count.
+    /// A program is there. While a vehicle is commanded, only its commander's signs of life count,
+    /// also after a silence: the vehicle's failsafe has to notice that the commander is gone,
+    /// however many watch. Before there is one, every program's count.
     pub fn alive(&mut self, now: Instant, seat: Seat) {
         if self.is_holders(seat) {
             // A page whose connection broke has come again.
@@ -131,7 +138,7 @@ impl Lease {
         (self.holder, self.has_left) = (None, false);
     }
 
-    /// Is a sign of life to be passed on to the vehicle now? Ask at least every [`LIFE`].
+    /// Must a sign of life be passed on to the vehicle now? Ask at least every [`LIFE`].
     pub fn is_sign_due(&mut self, now: Instant) -> bool {
         let due = self.is_heard(now) && self.passed.is_none_or(|passed| now.since(passed) >= LIFE);
         if due {

@@ -2,17 +2,19 @@
 
 use core::fmt;
 
-/// Number of a connection: a stream, an address of datagrams, a cable. Two that are there at the same time have different ones.
+/// Number of a connection: a stream, an address of datagrams, a cable. Two that are there at the
+/// same time have different ones.
 pub type Connection = u32;
 
-/// Who asks: not which kind of program, and not what number it gives itself, but which connection it has. Another that calls itself the same is
-/// another.
+/// Who asks: not which kind of program, and not what number it gives itself, but which connection
+/// it has. Another that calls itself the same is another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Seat {
     /// A page of the ground station, by its number.
     Page(u32),
-    /// A program that speaks MAVLink. Routers put several on one connection; they have other systems or components.
+    /// A program that speaks MAVLink. Routers put several on one connection; they have other
+    /// systems or components.
     Mavlink {
         /// Its connection.
         connection: Connection,
@@ -57,7 +59,7 @@ impl fmt::Display for Seat {
 pub enum Refusal {
     /// Another program commands.
     Occupied(Seat),
-    /// A pilot flies by hand.
+    /// A pilot flies the vehicle.
     PilotFlies,
     /// The vehicle takes no more commands at the moment.
     Full,

@@ -1,8 +1,9 @@
 //! Who commands a vehicle behind `connect`: which page, and which program.
 //!
-//! At the vehicle's end all pages are one station, and programs of the same system and component number are one. So this end tells them apart: one page has
-//! the [`Lease`], as at the ports of a simulated vehicle, and numbers belong to the connection that has used them first. What others say with
-//! them does not keep a vehicle in the air whose commander has left.
+//! At the vehicle's end all pages are one station, and programs of the same system and component
+//! number are one. So this end tells them apart: one page has the [`Lease`], as at the ports of a
+//! simulated vehicle, and numbers belong to the connection that has used them first. What others
+//! say with them does not keep a vehicle in the air whose commander has left.
 
 #![allow(deprecated, reason = "programs speak what the protocol has superseded for years after")]
 
@@ -15,9 +16,11 @@ use stampfly_types::messages::GuidedCommand;
 use stampfly_types::{Duration, Instant};
 use std::collections::HashMap;
 
-/// Numbers are free when the connection that has used them was not heard for this long: the vehicle has taken its link for lost by then.
+/// Numbers are free when the connection that has used them was not heard for this long: the vehicle
+/// has taken its link for lost by then.
 const FREE: Duration = Duration::from_secs(4);
-/// What a program may ask with the numbers of another: what changes nothing, and is no sign of life.
+/// What a program may ask with the numbers of another: what changes nothing, and is no sign of
+/// life.
 const READS: [u32; 6] = [
     PARAM_REQUEST_LIST_DATA::ID,
     PARAM_REQUEST_READ_DATA::ID,
@@ -96,7 +99,8 @@ mod tests {
         for ms in (0..5_000).step_by(1_000) {
             assert!(beat(ms, 1) && !beat(ms + 500, 2));
         }
-        // It is gone. The other chatters on, and is not heard before the vehicle's own patience is over.
+        // It is gone. The other chatters on, and is not heard before the vehicle's own patience is
+        // over.
         for ms in (5_000..8_000).step_by(500) {
             assert!(!beat(ms, 2), "{ms} ms");
         }

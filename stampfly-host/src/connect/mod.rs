@@ -1,4 +1,5 @@
-//! `stampfly connect`: the ground station of a real vehicle, at a serial port, behind TCP or in a Wi-Fi network.
+//! `stampfly connect`: the ground station of a real vehicle, at a serial port, behind TCP or in a
+//! Wi-Fi network.
 //!
 //! | part | what it does |
 //! |---|---|
@@ -11,7 +12,8 @@
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
 //! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
 //!
-//! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables pulled out. Pages are told.
+//! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables
+//! pulled out. Pages are told.
 
 mod crew;
 mod log;
@@ -113,7 +115,8 @@ struct Ends<V: Vehicle> {
 pub struct Carried {
     /// Was the vehicle ever heard?
     pub was_heard: bool,
-    /// Chunks of the flight record that have come, and that are missing between them, if it was wanted; or why it is not in the file.
+    /// Chunks of the flight record that have come, and that are missing between them, if it was
+    /// wanted; or why it is not in the file.
     pub record: Option<std::io::Result<[u64; 2]>>,
 }
 
@@ -227,7 +230,8 @@ impl<V: Vehicle> Ends<V> {
 }
 
 impl<V: Vehicle> Bridge<V> {
-    /// Of a vehicle whose line is there, for this hub of one vehicle and these open [`PORTS`]. Logs go into the folder.
+    /// Of a vehicle whose line is there, for this hub of one vehicle and these open [`PORTS`]. Logs
+    /// go into the folder.
     #[must_use]
     pub fn new(place: Place, baud: u32, hub: Arc<Hub>, ports: Arc<OpenPorts>, folder: PathBuf) -> Option<Self> {
         Self::by(Way::Line(place, baud), hub, ports, folder)

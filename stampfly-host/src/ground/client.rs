@@ -1,8 +1,8 @@
 //! One WebSocket: asks in; state, answers and events out.
 //!
-//! One thread does both. Writing gives up after a few milliseconds when the client does not take what is sent; then state is
-//! left out and counted until it does, and asks are still heard. Answers and events are not left out: a client that takes
-//! nothing for too long is cut off.
+//! One thread does both. Writing gives up after a few milliseconds when the client does not take
+//! what is sent; then state is left out and counted until it does, and asks are still heard.
+//! Answers and events are not left out: a client that takes nothing for too long is cut off.
 
 use super::limits::Limits;
 use super::pulse::Pulse;

@@ -1,11 +1,13 @@
-//! Bounds on what a client may cost the server of the page. The defaults are for people; tests take shorter times.
+//! Bounds on what a client may cost the server of the page. The defaults are for people; tests take
+//! shorter times.
 
 use std::time::Duration;
 
 /// What a client may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Requests at a time that are not answered yet. One more ends the oldest: a client that says half a request does not keep a person out.
+    /// Requests at a time that are not answered yet. One more ends the oldest: a client that says
+    /// half a request does not keep a person out.
     pub requests: usize,
     /// WebSockets at a time.
     pub sockets: usize,

@@ -1,7 +1,8 @@
-//! A ground station: one page in a browser that shows vehicles as they fly, and asks them for things.
+//! A ground station: one page in a browser that shows vehicles as they fly, and asks them for
+//! things.
 //!
-//! What page and vehicles share is in `stampfly-ground`; here is its web server. Everything is offline: the page is one file without a
-//! reference to the outside.
+//! What page and vehicles share is in `stampfly-ground`; here is its web server. Everything is
+//! offline: the page is one file without a reference to the outside.
 //!
 //! | part | what it is |
 //! |---|---|

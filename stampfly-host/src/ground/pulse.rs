@@ -1,22 +1,23 @@
-//! Since when a page may have asked what comes now, when it does not say so itself.
+//! The age of asks that carry no time of their own.
 //!
-//! A program that says twice a second that it is there, and falls silent, may wait for something. But when several such signs come at once behind a silence, a network has held
-//! them up: they were said while nothing came, and what comes with them may be as old.
+//! A silent page may be waiting for an answer. But several signs of life that arrive together after
+//! a silence were sent during it: a network has delayed them, and the asks that arrive with them
+//! may be as old as the silence.
 
 use std::time::Duration;
 
 /// A silence of this length may be that of a network.
 const SILENCE: Duration = Duration::from_secs(1);
-/// What was held up comes in one piece: after a gap of this length it is over.
+/// Delayed texts arrive within this time of one another.
 const BURST: Duration = Duration::from_millis(100);
-/// So many signs of life in one piece are none of a program that says them in time.
+/// Signs of life in one burst that a page without a delay does not send.
 const SIGNS: u32 = 2;
 
-/// What is known of one page's signs of life.
+/// The signs of life of one page.
 #[derive(Debug)]
 pub(super) struct Pulse {
     heard: Duration,
-    /// When the silence before this piece began, and signs of life in it.
+    /// The beginning of the silence before this burst, and the signs of life in the burst.
     silent: Option<(Duration, u32)>,
 }
 
@@ -25,7 +26,7 @@ impl Pulse {
         Self { heard: now, silent: None }
     }
 
-    /// Something has come. Returns since when it may have been on its way.
+    /// A text has arrived. Returns the earliest time at which it may have been sent.
     pub fn hear(&mut self, now: Duration, is_alive: bool) -> Duration {
         let gap = now.saturating_sub(self.heard);
         if gap > BURST {

@@ -1,6 +1,7 @@
 //! The server of the page: a thread that accepts, and one for each connection.
 //!
-//! For one person at a desk and a few programs. Where others can reach it, give it a [secret](Server::with_secret).
+//! For one person at a desk and a few programs. Where others can reach it, give it a
+//! [secret](Server::with_secret).
 
 use super::client;
 use super::limits::Limits;
@@ -79,7 +80,8 @@ impl Common {
         self.requests().retain(|(other, _)| *other != number);
     }
 
-    /// Does it know the secret, if there is one? Compared in a time that does not depend on where they differ.
+    /// Does it know the secret, if there is one? Compared in a time that does not depend on where
+    /// they differ.
     fn knows(&self, said: Option<&str>) -> bool {
         let Some(secret) = &self.secret else { return true };
         let said = said.unwrap_or_default();
@@ -113,7 +115,8 @@ impl Server {
         Self::with_secret(hub, listen, limits, None)
     }
 
-    /// The same. With a secret, only pages whose address ends with it see and ask anything: letters and digits.
+    /// The same. With a secret, only pages whose address ends with it see and ask anything: letters
+    /// and digits.
     ///
     /// # Errors
     /// When the system refuses the address.
@@ -192,7 +195,8 @@ fn attend(common: &Common, number: u64, mut stream: TcpStream) -> io::Result<()>
         Ok(request) => request,
         Err(refusal) => return refuse(&mut stream, refusal),
     };
-    // The page itself shows nothing and knows nothing: the secret is in its address, behind what a browser sends.
+    // The page itself shows nothing and knows nothing: the secret is in its address, behind what a
+    // browser sends.
     if wanted != Wanted::Page && !common.knows(secret.as_deref()) {
         return refuse(&mut stream, Refusal::Secret);
     }
@@ -226,7 +230,8 @@ fn attend(common: &Common, number: u64, mut stream: TcpStream) -> io::Result<()>
     }
 }
 
-/// Sends a log part by part, as it is on the disk. A client that is slower than the limit gets a part of it.
+/// Sends a log part by part, as it is on the disk. A client that is slower than the limit gets a
+/// part of it.
 fn send_log(limits: &Limits, stream: &mut TcpStream, vehicle: usize, log: LogSoFar) -> io::Result<()> {
     let LogSoFar { length, mut bytes } = log;
     let name = format!("Content-Disposition: attachment; filename=\"vehicle-{vehicle}.ulg\"\r\n");
@@ -283,8 +288,8 @@ fn answer(stream: &mut TcpStream, head: &[u8], body: &[u8]) -> io::Result<()> {
 
 fn end(stream: &mut TcpStream) -> io::Result<()> {
     stream.shutdown(Shutdown::Write)?;
-    // A connection that is closed with bytes unread is reset, and the answer may be lost. A little of what the client still
-    // sends is read, for a little time.
+    // A connection that is closed with bytes unread is reset, and the answer may be lost. A little
+    // of what the client still sends is read, for a little time.
     stream.set_read_timeout(Some(Duration::from_millis(200)))?;
     let mut rest = [0; 2048];
     for _ in 0..32 {

@@ -1,5 +1,6 @@
-//! The programs that are connected to TCP ports: one thread reads, one writes, and a queue of bounded length between the flight
-//! and the writer, so that a program that reads slowly does not hold up a flight.
+//! The programs that are connected to TCP ports: one thread reads, one writes, and a queue of
+//! bounded length between the flight and the writer, so that a program that reads slowly does not
+//! hold up a flight.
 
 use super::events::{Events, POLL};
 use super::greeting::{Foreign, Greeting};
@@ -88,7 +89,8 @@ impl Connections {
         }
     }
 
-    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time. A serial line loses what no program reads.
+    /// Sends to one. A connection whose queue is full is closed: it has not read for a long time. A
+    /// serial line loses what no program reads.
     pub fn send(&self, to: &Client, bytes: &[u8]) {
         let mut all = self.queues();
         if all.get(to).is_some_and(|queue| queue.bytes.try_send(bytes.to_vec()).is_err() && !queue.stays) {
@@ -160,8 +162,8 @@ impl Connections {
     }
 }
 
-/// Is there room for another connection to this port? Of too many, the oldest that has shown nothing makes room: who only listens may, but keeps no
-/// program out.
+/// Is there room for another connection to this port? Of too many, the oldest that has shown
+/// nothing makes room: who only listens may, but keeps no program out.
 fn has_room(all: &mut HashMap<Client, Queue>, port: usize) -> bool {
     let at_port = all.iter().filter(|(client, _)| client.port == port);
     if at_port.clone().count() < MOST {
@@ -193,7 +195,8 @@ fn read(
                     if greeting.is_shown() && !core::mem::replace(&mut is_shown, true) {
                         connections.show(&client);
                     }
-                    // Waits while the flight has much to hear: the sender is held up, not the flight.
+                    // Waits while the flight has much to hear: the sender is held up, not the
+                    // flight.
                     if !bytes.is_empty() {
                         events.put(client, Heard::Bytes(&bytes));
                     }
@@ -207,7 +210,8 @@ fn read(
     heard
 }
 
-/// Ends when the queue's other end is gone and everything in it is written, or the program takes no more.
+/// Ends when the queue's other end is gone and everything in it is written, or the program takes no
+/// more.
 fn write(mut stream: TcpStream, waiting: &Receiver<Vec<u8>>) {
     while let Ok(bytes) = waiting.recv() {
         if stream.write_all(&bytes).is_err() {

@@ -1,8 +1,10 @@
-//! A log of what a vehicle does while it is armed, and shortly around it.
+//! The log of a served vehicle: while it is armed, a few seconds before, and a few after.
 //!
-//! A vehicle that stands for a night would fill a disk: half a megabyte a second. So what comes while it is disarmed waits in memory, in parts that begin with a key frame, and only the
-//! last ones are kept. When the vehicle arms they are written, and everything after them until it has been disarmed for a while. Where parts are missing the
-//! log has a mark of loss, and a replay goes on at the key frame behind it.
+//! A log grows by half a megabyte a second, and a vehicle may stand for a night. While it is
+//! disarmed, messages wait in memory, in parts that begin with a key frame, and only the newest
+//! parts are kept. Arming writes them, and everything that follows until some seconds after
+//! disarming. A dropout message marks the gap between two flights, and a replay continues at the
+//! key frame behind it.
 
 use crate::log_file::LogFile;
 use stampfly_log::ulog::Sink;
@@ -14,18 +16,19 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Parts before arming that are kept, and after disarming that are written. A recorder begins one a second.
+/// Parts before arming that are kept, and after disarming that are written. A recorder begins one a
+/// second.
 const BEFORE: usize = 5;
 const AFTER: usize = 10;
 /// The kind of a message that begins a part, and of one that says how much is missing.
 const MARK: u8 = b'S';
 const LOSS: u8 = b'O';
 
-/// Is the vehicle armed? Shared by the flight, which says so, and its log.
+/// Is the vehicle armed? The flight sets it, its log reads it.
 #[derive(Clone, Debug, Default)]
 pub struct Armed(Arc<AtomicBool>);
 
-/// Looks whether a vehicle is armed.
+/// Sets an [`Armed`] from a flight's samples.
 #[derive(Debug)]
 pub struct ArmedWitness {
     armed: Armed,
@@ -34,7 +37,7 @@ pub struct ArmedWitness {
 }
 
 impl Armed {
-    /// The witness of a flight of a vehicle with these topics.
+    /// Follows a flight of a vehicle with these topics.
     #[must_use]
     pub fn witness(&self, topics: &[stampfly_bus::TopicInfo]) -> ArmedWitness {
         let status = topics.iter().position(|topic| topic.name == "flight_status");
@@ -65,21 +68,21 @@ impl stampfly_flight::Observer for ArmedWitness {}
 pub struct FlightLog {
     file: LogFile,
     armed: Armed,
-    /// Bytes that are written, and that may be.
+    /// Bytes in the file, and the most that it may have.
     written: u64,
     limit: u64,
-    /// Is what comes written? The head is.
+    /// Are messages written at once? Those of the head are.
     is_writing: bool,
     /// Parts that were written since the vehicle is disarmed.
     after: usize,
-    /// What waits.
+    /// The parts that wait.
     parts: VecDeque<Vec<u8>>,
     /// Parts that are missing between what is written and what waits.
     missing: u64,
 }
 
 impl FlightLog {
-    /// Into this file, at most so many bytes.
+    /// Writes into this file, up to `limit` bytes.
     #[must_use]
     pub fn new(file: LogFile, armed: Armed, limit: u64) -> Self {
         // The head ends with the first mark, long after nothing is armed.
@@ -87,7 +90,8 @@ impl FlightLog {
         Self { file, armed, written: 0, limit, is_writing, after, parts: VecDeque::new(), missing: 0 }
     }
 
-    /// The flight is over: what still waits is written, so that a vehicle that was never armed has a log as well.
+    /// Ends the log with the parts that wait, so that a vehicle that was never armed has a log,
+    /// too.
     ///
     /// # Errors
     /// When the disk does not take it.
@@ -112,7 +116,7 @@ impl FlightLog {
         }
     }
 
-    /// From now on what comes is written, behind what waits.
+    /// Writes the parts that wait. The messages that follow are written at once.
     fn begin(&mut self) -> io::Result<()> {
         let missing = core::mem::take(&mut self.missing);
         if missing > 0 {

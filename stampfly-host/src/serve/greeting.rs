@@ -1,9 +1,10 @@
 //! The first bytes of a connection: are they the port's language?
 //!
-//! A web page can make a browser connect to any port of the computer that shows it, and put any bytes behind the head of its request. A decoder
-//! that looks for the next frame would find them. So nothing of a connection is handed over before its first frame, or its first
-//! line, has shown the port's language, and a connection that begins with anything else is ended. After that, noise between frames is passed
-//! over as on any line.
+//! A web page can make a browser connect to any port of its computer, and choose the bytes behind
+//! the head of the request. A decoder that searches for the next frame would find one there. So the
+//! reader hands nothing over before a first frame, or a first line, has shown the port's language,
+//! and ends a connection that begins with anything else. Later noise between frames is skipped, as
+//! on any line.
 
 use stampfly_link::mavlink::MavlinkDecoder;
 use stampfly_link::mavlink::dialects::common::MavMessage;
@@ -11,7 +12,8 @@ use stampfly_link::msp::MspDecoder;
 use stampfly_sim::vehicle::Speech;
 use std::fmt;
 
-/// Bytes that wait for the end of a first frame or line: more than the longest frame of MAVLink has.
+/// Bytes that wait for the end of a first frame or line: more than the longest frame of MAVLink
+/// has.
 const LONGEST: usize = 512;
 /// Payload of a first question in MSP: configurators begin with one that has none.
 const QUESTION: usize = 256;
@@ -19,10 +21,11 @@ const QUESTION: usize = 256;
 const HTTP: &[u8] = b" HTTP/";
 /// First byte of a greeting in TLS. At a terminal it is Ctrl-V.
 const TLS: u8 = 0x16;
-/// First bytes that programs for terminals send: line ends, keys that are none of text, and the beginning of a telnet command.
+/// First bytes that programs for terminals send: line ends, keys that are none of text, and the
+/// beginning of a telnet command.
 const KEYS: &[u8] = b"\r\n\t\x03\x04\x08\x0c\x15\x17\x1b\x7f\xff";
 
-/// What a connection speaks that does not speak its port's language.
+/// The language of a connection that does not speak its port's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// HTTP: a browser, most likely with a web page that does what it must not.
@@ -44,7 +47,7 @@ impl fmt::Display for Foreign {
 }
 
 impl Foreign {
-    /// What bytes speak that are no frame: as far as they have come.
+    /// The language of bytes that are not a frame, judged by those received so far.
     fn of(bytes: &[u8]) -> Self {
         match bytes {
             [TLS, ..] => Self::Tls,
@@ -60,7 +63,7 @@ fn method(bytes: &[u8]) -> (usize, Option<u8>) {
     (length, bytes.get(length).copied())
 }
 
-/// What has to be seen before a connection is believed to speak its port's language.
+/// The proof that a connection speaks its port's language.
 enum Proof {
     Mavlink(Box<MavlinkDecoder<MavMessage>>),
     Msp(Box<MspDecoder<QUESTION>>),
@@ -73,7 +76,7 @@ enum Proof {
 /// The beginning of one connection.
 pub(super) struct Greeting {
     proof: Proof,
-    /// What has come of a first frame or line.
+    /// The bytes of the first frame or line so far.
     begun: Vec<u8>,
 }
 
@@ -95,8 +98,8 @@ impl Greeting {
         matches!(self.proof, Proof::Shown)
     }
 
-    /// Takes the next bytes, and hands over those that may be obeyed: a first frame when it is whole, a first line key by key, and then
-    /// everything.
+    /// Takes the next bytes, and hands over those that may be obeyed: a first frame when it is
+    /// whole, a first line key by key, and then everything.
     ///
     /// # Errors
     /// When they are not the port's language. The connection is to be ended.
@@ -124,7 +127,8 @@ impl Greeting {
         Ok(Vec::new())
     }
 
-    /// A line does nothing before its end, and a person wants to see what he types: keys are handed over as they come.
+    /// A line has no effect before its end, and a terminal must echo each key: keys are handed over
+    /// as they come.
     fn line(&mut self, first: u8, bytes: &[u8]) -> Result<Vec<u8>, Foreign> {
         let is_text = first == b' ' || first.is_ascii_graphic() || KEYS.contains(&first);
         let end = self.begun.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
@@ -196,7 +200,7 @@ mod tests {
             (b"GET /\xfd HTTP/1.1\r\n\r\n", Foreign::Http),
             (b"OPTIONS * HTTP/1.1\r\n\r\n", Foreign::Http),
             (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", Foreign::Http),
-            // What TLS, and STUN over TCP, as WebRTC speaks it, begin with.
+            // The first bytes of TLS, and of STUN over TCP, which WebRTC uses.
             (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", Foreign::Tls),
             (b"\x00\x01\x00\x00\x21\x12\xa4\x42", Foreign::Other),
             (b"\x80\x2e\x01\x03\x01", Foreign::Other),

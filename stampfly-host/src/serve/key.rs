@@ -1,4 +1,5 @@
-//! The key of a vehicle: with it MAVLink is signed at ports that others can reach, and frames are sealed.
+//! The key of a vehicle: with it MAVLink is signed at ports that others can reach, and frames are
+//! sealed.
 
 use stampfly_link::secure;
 use stampfly_sim::vehicle::Signing;
@@ -80,7 +81,8 @@ impl std::error::Error for KeyError {
 }
 
 impl Key {
-    /// Reads a file with nothing but the key, as digits or as the text that a vehicle's `key` shows.
+    /// Reads a file with nothing but the key, as digits or as the text that a vehicle's `key`
+    /// shows.
     ///
     /// # Errors
     /// When it cannot be read, when it can be read by others, or is no key.
@@ -93,7 +95,8 @@ impl Key {
         Self::parse(text.trim()).ok_or_else(|| failed(Why::NoKey))
     }
 
-    /// Makes a key of the system's random numbers, and a file for it that no other account can read. A file that is there already is kept.
+    /// Makes a key of the system's random numbers, and a file for it that no other account can
+    /// read. A file that is there already is kept.
     ///
     /// # Errors
     /// When there is one already, or it cannot be made.

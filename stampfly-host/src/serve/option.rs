@@ -1,12 +1,13 @@
-//! Where a port of a vehicle is to be: `NAME=ADDRESS:NUMBER`, `NAME=NUMBER` or `NAME=off`; `others=off` closes those that are not named.
+//! Where a port of a vehicle is to be: `NAME=ADDRESS:NUMBER`, `NAME=NUMBER` or `NAME=off`;
+//! `others=off` closes those that are not named.
 
 use stampfly_sim::vehicle::{PortSpec, Transport};
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::str::FromStr;
 
-/// Between the ports of one vehicle and those of the next in the same world: as PX4's and ArduPilot's simulators do it for
-/// MAVLink.
+/// Between the ports of one vehicle and those of the next in the same world: as PX4's and
+/// ArduPilot's simulators do it for MAVLink.
 const NEXT_VEHICLE: u16 = 10;
 /// All ports that are not named.
 const OTHERS: &str = "others";
@@ -72,8 +73,8 @@ impl PortOption {
         Err(format!("{whose} has no port '{}'; it has {}", unknown.name, names.join(", ")))
     }
 
-    /// Where this port of the `number`-th vehicle is, from zero: as the options say, else on this machine at its own number.
-    /// `None` for nowhere.
+    /// Where this port of the `number`-th vehicle is, from zero: as the options say, else on this
+    /// machine at its own number. `None` for nowhere.
     #[must_use]
     pub fn place(options: &[Self], port: &PortSpec, number: usize) -> Option<SocketAddr> {
         let named = |name: &str| options.iter().rev().find(|option| option.name == name);

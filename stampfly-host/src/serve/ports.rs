@@ -1,7 +1,7 @@
 //! The open ports of one vehicle: a thread a socket, one queue of bounded length to the flight.
 //!
-//! Datagrams that come while the queue is full are lost, as in a socket's own buffer; streams wait. The flight takes a bounded
-//! number in a tick, so a flood costs datagrams and no time.
+//! Datagrams that come while the queue is full are lost, as in a socket's own buffer; streams wait.
+//! The flight takes a bounded number in a tick, so a flood costs datagrams and no time.
 
 use super::connections::{Connections, Ended};
 use super::events::{self, Event, Events, POLL};
@@ -110,12 +110,14 @@ impl fmt::Debug for OpenPorts {
 }
 
 impl OpenPorts {
-    /// Opens those of the `number`-th vehicle, from zero, where the options want them. At ports that others can reach, and with a
-    /// [key for everywhere](Key::everywhere) at all, commands need the key.
+    /// Opens those of the `number`-th vehicle, from zero, where the options want them. At ports
+    /// that others can reach, and with a [key for everywhere](Key::everywhere) at all, commands
+    /// need the key.
     ///
     /// # Errors
-    /// When one that is named in the options cannot be opened, or must not: others could command the vehicle there without a key. One that is not
-    /// named is [missed](Self::missed) when another program has it.
+    /// When one that is named in the options cannot be opened, or must not: others could command
+    /// the vehicle there without a key. One that is not named is [missed](Self::missed) when
+    /// another program has it.
     pub fn open(
         ports: &'static [PortSpec],
         options: &[PortOption],
@@ -166,8 +168,7 @@ impl OpenPorts {
 
     /// Is there anything to be said at this port?
     fn is_of_use(&self, spec: &PortSpec, is_named: bool) -> bool {
-        // What cannot be said, a port that is there when it is wanted, one that cannot ask for the key, a kind of port that this system does not
-        // have: a word is said of those that are named.
+        // A named port is always tried, so that its failure is reported.
         (*spec != PortSpec::SEALED || self.key.is_some())
             && (is_named || !spec.when_named)
             && (is_named || !self.is_without_the_key(spec))
@@ -183,7 +184,8 @@ impl OpenPorts {
         }
     }
 
-    /// Is the key asked for everywhere, and can this port not ask for it? A pseudo-terminal belongs to the account that has made it.
+    /// Is the key asked for everywhere, and can this port not ask for it? A pseudo-terminal belongs
+    /// to the account that has made it.
     fn is_without_the_key(&self, spec: &PortSpec) -> bool {
         let has_room = spec.guard != Guard::Loopback || spec.transport == Transport::Terminal;
         !has_room && self.key.as_ref().is_some_and(Key::is_everywhere)
@@ -269,7 +271,8 @@ impl OpenPorts {
         &self.terminals
     }
 
-    /// The vehicle was restarted, and knows nobody: it is told again who is connected.
+    /// The vehicle was restarted and has no clients: every open connection is announced to it
+    /// again.
     pub fn reopen(&self) {
         let targets = self.places.iter().filter(|(spec, _)| spec.transport == Transport::UdpTo);
         let targets = targets.filter_map(|(spec, address)| {

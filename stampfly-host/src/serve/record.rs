@@ -1,7 +1,8 @@
 //! Where the compact record of a simulated flight goes: datagrams, or memory.
 //!
-//! A vehicle would stream it the same way: what sends has a ring and a [`Streamer`](stampfly_flight::compact::Streamer), what receives
-//! writes chunks behind each other. [`receive`] is that end here.
+//! A vehicle would stream it the same way: what sends has a ring and a
+//! [`Streamer`](stampfly_flight::compact::Streamer), what receives writes chunks behind each other.
+//! [`receive`] is that end here.
 
 use crate::waited::has_only_waited;
 use stampfly_bus::Schedule;
@@ -87,7 +88,8 @@ pub(crate) fn write_chunk(file: &mut impl Write, chunk: &[u8]) -> io::Result<()>
     file.write_all(chunk)
 }
 
-/// Writes the chunks that arrive into a file, until so much time has passed, or none has come for three seconds after the first.
+/// Writes the chunks that arrive into a file, until so much time has passed, or none has come for
+/// three seconds after the first.
 ///
 /// # Errors
 /// When the socket or the file fails. What is no chunk is ignored.

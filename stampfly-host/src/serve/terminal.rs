@@ -1,4 +1,5 @@
-//! A pseudo-terminal: a serial port that exists in this machine alone, for programs that speak through one.
+//! A pseudo-terminal: a serial port that exists in this machine alone, for programs that speak
+//! through one.
 //!
 //! The system gives it a name when it is opened, `/dev/pts/3` or `/dev/ttys003`. There is one line,
 //! whichever program opens it, and the vehicle does not know whether one has: bytes that no program

@@ -1,10 +1,13 @@
-//! A key that vehicle and station share, and its form as text, to be handed over by USB or as a QR code.
+//! A key that vehicle and station share, and its form as text, to be handed over by USB or as a QR
+//! code.
 //!
-//! `stampfly://key?id=7&key=HEX&sum=HEX`: the number of the key, its 32 bytes, and the CRC-32 (IEEE 802.3) of number and
-//! bytes, most significant digit first. All digits are lower case, nothing may be left out, and nothing may follow.
+//! `stampfly://key?id=7&key=HEX&sum=HEX`: the number of the key, its 32 bytes, and the CRC-32 (IEEE
+//! 802.3) of number and bytes, most significant digit first. All digits are lower case, nothing may
+//! be left out, and nothing may follow.
 //!
-//! A key never goes over the air. Nobody needs to type it; the checksum is for a line that was cut off. What can be printed
-//! is [`Key::uri`] alone: `Debug` prints the number, and no error contains what was read.
+//! A key never goes over the air. Nobody needs to type it; the checksum is for a line that was cut
+//! off. What can be printed is [`Key::uri`] alone: `Debug` prints the number, and no error contains
+//! what was read.
 
 use super::cipher::{KEY, Secret};
 use crate::datagram::crc32;
@@ -68,8 +71,8 @@ pub struct Key {
 }
 
 impl Key {
-    /// A key of bytes of a generator of random numbers; an ESP32's is one only while its radio is on. Give every station a
-    /// key and a number of its own.
+    /// A key of bytes of a generator of random numbers; an ESP32's is one only while its radio is
+    /// on. Give every station a key and a number of its own.
     ///
     /// # Errors
     /// When all bytes are the same.
@@ -85,7 +88,8 @@ impl Key {
     /// When it is none.
     pub fn from_uri(text: &str) -> Result<Self, KeyError> {
         let rest = text.trim().strip_prefix(BEFORE).ok_or(KeyError::Form)?;
-        // No search for a word in a text: what the library has for that may panic, for all a linker knows.
+        // No search for a word in a text: what the library has for that may panic, for all a linker
+        // knows.
         let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
         let (id, rest) = rest.split_at_checked(digits).ok_or(KeyError::Form)?;
         let rest = rest.strip_prefix(KEY_WORD).ok_or(KeyError::Form)?;
@@ -117,7 +121,8 @@ impl Key {
         self.bytes.bytes()
     }
 
-    /// A key for one other purpose: who knows it knows neither this one nor that of another purpose.
+    /// A key for one other purpose: who knows it knows neither this one nor that of another
+    /// purpose.
     ///
     /// ```
     /// use stampfly_link::secure::Key;
@@ -130,8 +135,8 @@ impl Key {
         *self.bytes.derive(*label).bytes()
     }
 
-    /// The pass-phrase of stations that speak MAVLink: 64 digits, to be typed or pasted where a ground station asks for one. Who knows it can
-    /// [sign](crate::mavlink::signing) and not seal.
+    /// The pass-phrase of stations that speak MAVLink: 64 digits, to be typed or pasted where a
+    /// ground station asks for one. Who knows it can [sign](crate::mavlink::signing) and not seal.
     #[must_use]
     pub fn phrase(&self) -> Phrase {
         let mut digits = [0; 2 * KEY];

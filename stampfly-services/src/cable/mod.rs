@@ -1,13 +1,14 @@
-//! Everything that is spoken on a vehicle's serial line: a person's text, MAVLink for any ground station, and this family's own ground station in tunnels
-//! of MAVLink.
+//! Everything that is spoken on a vehicle's serial line: a person's text, MAVLink for any ground
+//! station, and this family's own ground station in tunnels of MAVLink.
 //!
 //! | file | what it does |
 //! |---|---|
 //! | `split.rs` | which bytes are text, and which are frames |
 //! | `envelope.rs` | payloads of the secure link in `TUNNEL` |
 //!
-//! The vehicle says nothing in MAVLink until it has heard a frame, and no more [30 s](crate::mavlink) after the last: a terminal shows text alone. For lines whose
-//! other end is in reach, such as USB: nobody is authenticated.
+//! The vehicle says nothing in MAVLink until it has heard a frame, and no more [30
+//! s](crate::mavlink) after the last: a terminal shows text alone. For lines whose other end is in
+//! reach, such as USB: nobody is authenticated.
 
 mod envelope;
 mod split;
@@ -41,7 +42,8 @@ const WAITS: usize = 4;
 const FRESH_MS: i32 = 1_000;
 const LATE: &str = "expired: it came more than a second late, and was not done";
 
-/// Was this said too long ago? What seems to be said in the future is not: a station counts on while a simulated vehicle's time is slower.
+/// Was this said too long ago? What seems to be said in the future is not: a station counts on
+/// while a simulated vehicle's time is slower.
 const fn is_late(now: Instant, said: u32) -> bool {
     ((now.as_micros() / 1_000) as u32).wrapping_sub(said) as i32 > FRESH_MS
 }
@@ -54,10 +56,11 @@ fn is_never_late(payload: &Payload<'_>) -> bool {
 /// Where frames go. Each is handed over whole.
 pub type Put<'p> = &'p mut dyn FnMut(&[u8]);
 
-/// One serial line, at which a station may watch up to `WATCHED` topics and upload a mission of up to `ITEMS` items.
+/// One serial line, at which a station may watch up to `WATCHED` topics and upload a mission of up
+/// to `ITEMS` items.
 ///
-/// Give it what is heard with [`hear`](Self::hear), which hands what a person types to a terminal; call [`poll`](Self::poll) and [`answer`](Self::answer) about a
-/// hundred times a second.
+/// Give it what is heard with [`hear`](Self::hear), which hands what a person types to a terminal;
+/// call [`poll`](Self::poll) and [`answer`](Self::answer) about a hundred times a second.
 #[derive(Clone, Debug)]
 pub struct Cable<const WATCHED: usize, const ITEMS: usize = { crate::mavlink::ITEMS }> {
     split: Split,
@@ -231,7 +234,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         });
     }
 
-    /// Makes the next answers. Returns what only the board can do, which then [reports](Self::report).
+    /// Makes the next answers. Returns what only the board can do, which then
+    /// [reports](Self::report).
     pub fn answer<V: Vehicle>(&mut self, now: Instant, vehicle: &mut V, put: Put<'_>) -> Request<V::Request> {
         let mut room = Room::default();
         for _ in 0..AT_ONCE {
@@ -244,7 +248,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         Request::Nothing
     }
 
-    /// What the station has said last of the flight record: that it is wanted, or is not; once. See [`Tape`](crate::Tape).
+    /// What the station has said last of the flight record: that it is wanted, or is not; once. See
+    /// [`Tape`](crate::Tape).
     pub const fn record(&mut self) -> Option<bool> {
         self.desk.record()
     }

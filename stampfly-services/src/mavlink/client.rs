@@ -119,7 +119,8 @@ impl<C> Client<C> {
         self.now.as_micros() / 1_000_000
     }
 
-    /// May it be sent to? Whoever has to sign and has not is sent nothing that it did not connect for.
+    /// May it be sent to? Whoever has to sign and has not is sent nothing that it did not connect
+    /// for.
     pub const fn is_served(&self) -> bool {
         self.stays || self.believed
     }
@@ -138,10 +139,12 @@ impl<C> Client<C> {
         may
     }
 
-    /// Takes a byte. Returns the message that it ends. What is no message of the dialect and wants no answer is passed over.
+    /// Takes a byte. Returns the message that it ends. What is no message of the dialect and wants
+    /// no answer is passed over.
     pub fn feed(&mut self, byte: u8, own: u8, guard: Option<&mut Guard>) -> Option<Fed> {
         let frame = self.decoder.feed(byte)?;
-        // What the vehicle itself has said, and signed, comes back from a router, or from one who has no key of his own.
+        // What the vehicle itself has said, and signed, comes back from a router, or from one who
+        // has no key of his own.
         if [frame.system, frame.component] == [own, AUTOPILOT] {
             return Some(Fed::Own);
         }
@@ -168,7 +171,8 @@ impl<C> Client<C> {
         self.send_payload(message.id, message.payload(), put);
     }
 
-    /// Says a sentence of any length: in pieces of 50 bytes, which a station that knows them puts together again.
+    /// Says a sentence of any length: in pieces of 50 bytes, which a station that knows them puts
+    /// together again.
     pub fn say(&mut self, severity: MavSeverity, sentence: &str, put: Put<'_, C>) {
         let pieces = sentence.as_bytes().chunks(PIECE);
         // A number that the last sentence did not have; zero is for one of a single piece.

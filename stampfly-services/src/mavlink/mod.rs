@@ -1,4 +1,5 @@
-//! The vehicle's end of MAVLink: heartbeat, streams, commands, parameters, missions, for several clients at once.
+//! The vehicle's end of MAVLink: heartbeat, streams, commands, parameters, missions, for several
+//! clients at once.
 //!
 //! | file | what it does |
 //! |---|---|
@@ -19,14 +20,18 @@
 //! | `missions.rs` | the mission protocol |
 //! | `item.rs` | a mission item, and the [step](crate::mission::Step) that it means |
 //!
-//! Implemented from the protocol's description: [heartbeat](https://mavlink.io/en/services/heartbeat.html),
-//! [commands](https://mavlink.io/en/services/command.html), [parameters](https://mavlink.io/en/services/parameter.html),
-//! [mission](https://mavlink.io/en/services/mission.html), [signing](https://mavlink.io/en/guide/message_signing.html). Positions are local, north east down,
-//! and global as soon as somebody knows where on Earth the vehicle is: the vehicle itself, or a station that has said so with `SET_GPS_GLOBAL_ORIGIN`.
-//! `MAV_CMD_NAV_TAKEOFF` takes its altitude as height above the ground.
+//! Implemented from the protocol's description:
+//! [heartbeat](https://mavlink.io/en/services/heartbeat.html),
+//! [commands](https://mavlink.io/en/services/command.html),
+//! [parameters](https://mavlink.io/en/services/parameter.html),
+//! [mission](https://mavlink.io/en/services/mission.html),
+//! [signing](https://mavlink.io/en/guide/message_signing.html). Positions are local, north east
+//! down, and global as soon as somebody knows where on Earth the vehicle is: the vehicle itself, or
+//! a station that has said so with `SET_GPS_GLOBAL_ORIGIN`. `MAV_CMD_NAV_TAKEOFF` takes its
+//! altitude as height above the ground.
 //!
-//! Several clients may be connected; the [lease](crate::lease) says who commands. Give it a [key](Mavlink::with_key) wherever others than one's own programs can
-//! reach it.
+//! Several clients may be connected; the [lease](crate::lease) says who commands. Give it a
+//! [key](Mavlink::with_key) wherever others than one's own programs can reach it.
 
 #![allow(deprecated, reason = "programs speak what the protocol has superseded for years after")]
 
@@ -70,7 +75,8 @@ use stampfly_types::{Duration, Instant};
 
 /// Clients that can be connected at once.
 pub const CLIENTS: usize = 8;
-/// A client of datagrams that was not heard for this long is forgotten, unless the vehicle was told to send to it.
+/// A client of datagrams that was not heard for this long is forgotten, unless the vehicle was told
+/// to send to it.
 const FORGOTTEN: Duration = Duration::from_secs(30);
 /// The number of `HEARTBEAT`.
 const HEARTBEAT: u32 = 0;
@@ -81,11 +87,13 @@ const TOLD: Duration = Duration::from_secs(1);
 /// And at most so often of frames that were not believed.
 const COUNTED: Duration = Duration::from_secs(5);
 
-/// The vehicle's end of MAVLink. `C` tells its clients apart: an address, a number. A mission has at most `ITEMS` items, of which memory is taken twice: for the one in
-/// force and for one that is uploaded.
+/// The vehicle's end of MAVLink. `C` tells its clients apart: an address, a number. A mission has
+/// at most `ITEMS` items, of which memory is taken twice: for the one in force and for one that is
+/// uploaded.
 ///
-/// Give it what is heard with [`hear`](Self::hear) and call [`poll`](Self::poll) about fifty times a second; it hands what is to be sent to
-/// `put`. `stampfly-board`'s simulation connects it to sockets.
+/// Give it what is heard with [`hear`](Self::hear) and call [`poll`](Self::poll) about fifty times
+/// a second; it hands what is to be sent to `put`. `stampfly-board`'s simulation connects it to
+/// sockets.
 #[derive(Clone, Debug)]
 pub struct Mavlink<C, const N: usize = CLIENTS, const ITEMS: usize = { missions::ITEMS }> {
     own: Own,
@@ -134,8 +142,9 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         }
     }
 
-    /// The same, which signs what it sends and believes what is signed with this key alone. `epoch` is the signature time at the clock's zero, in units of
-    /// 10 µs since 2015, and must be later than the last one before a restart.
+    /// The same, which signs what it sends and believes what is signed with this key alone. `epoch`
+    /// is the signature time at the clock's zero, in units of 10 µs since 2015, and must be later
+    /// than the last one before a restart.
     #[must_use]
     pub fn with_key(mut self, key: SigningKey, epoch: u64) -> Self {
         let verifier = Verifier::new(key.clone(), epoch);
@@ -143,7 +152,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self
     }
 
-    /// Clients that were turned away because there were too many, or because they do not speak MAVLink. Wraps around.
+    /// Clients that were turned away because there were too many, or because they do not speak
+    /// MAVLink. Wraps around.
     #[must_use]
     pub const fn refused(&self) -> u32 {
         self.refused
@@ -155,8 +165,9 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self.untrusted
     }
 
-    /// The latest time of a signature that was believed or made, in units of 10 µs since 2015. `None` without a key. Keep it over a restart: what was signed before must not be
-    /// believed after it.
+    /// The latest time of a signature that was believed or made, in units of 10 µs since 2015.
+    /// `None` without a key. Keep it over a restart: what was signed before must not be believed
+    /// after it.
     #[must_use]
     pub fn signature_time(&self, now: Instant) -> Option<u64> {
         let Guard { epoch, verifier, .. } = self.guard.as_ref()?;
@@ -170,13 +181,15 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self.clients.iter().any(|known| known.id == client && known.believed)
     }
 
-    /// Somebody is there to be sent to, whether or not it says anything. With `stays` it is never forgotten.
+    /// Somebody is there to be sent to, whether or not it says anything. With `stays` it is never
+    /// forgotten.
     pub fn open(&mut self, now: Instant, client: C, stays: bool) {
         let guarded = self.guard.is_some();
         self.admit(now, client, stays, guarded);
     }
 
-    /// The same for somebody on the same machine or at the other end of a cable, who need not sign although others must.
+    /// The same for somebody on the same machine or at the other end of a cable, who need not sign
+    /// although others must.
     pub fn open_local(&mut self, now: Instant, client: C, stays: bool) {
         self.admit(now, client, stays, false);
     }
@@ -186,7 +199,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             return;
         }
         if self.clients.is_full() {
-            // Strangers must not keep a station out, nor must one that was there before and has begun again at another place.
+            // Strangers must not keep a station out, nor must one that was there before and has
+            // begun again at another place.
             let stranger = self.clients.iter().position(|known| !known.is_served());
             let gone = || self.clients.iter().position(|known| !known.stays && now.since(known.heard) >= QUIET);
             if let Some(place) = stranger.or_else(gone) {
@@ -227,7 +241,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         self.hear_any(now, from, self.guard.is_some(), bytes, cockpit, put, tunnel);
     }
 
-    /// Takes what a client on the same machine has sent, who need not sign although others must, and answers.
+    /// Takes what a client on the same machine has sent, who need not sign although others must,
+    /// and answers.
     pub fn hear_local(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
         self.hear_any(now, from, false, bytes, cockpit, put, &mut |_, _| {});
     }
@@ -244,7 +259,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         put: Put<'_, C>,
         tunnel: &mut dyn FnMut(Seat, Tunnel),
     ) {
-        // A datagram holds whole frames. What begins otherwise is of no program that speaks MAVLink, and takes no place of one that does.
+        // A datagram holds whole frames. What begins otherwise is of no program that speaks
+        // MAVLink, and takes no place of one that does.
         if !self.clients.iter().any(|known| known.id == from) {
             if !begins_with_a_frame(bytes) {
                 self.refused = self.refused.wrapping_add(1);
@@ -263,8 +279,9 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 None | Some(Fed::Own) => continue,
                 Some(Fed::Untrusted(why)) => {
                     *untrusted = untrusted.wrapping_add(1);
-                    // It has the key, and its clock is behind the vehicle's: stations take over the time of whatever is signed with their key. One that sends again what others have
-                    // said gets a heartbeat for it.
+                    // It has the key, and its clock is behind the vehicle's: stations take over the
+                    // time of whatever is signed with their key. One that sends again what others
+                    // have said gets a heartbeat for it.
                     if why == Untrusted::Old
                         && !client.believed
                         && let Some(heartbeat) = streams::make(HEARTBEAT, now, own, &cockpit.view())
@@ -303,7 +320,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         }
     }
 
-    /// Sends a client a message by its number and fields. Nothing happens to one that is not connected.
+    /// Sends a client a message by its number and fields. Nothing happens to one that is not
+    /// connected.
     pub fn send_payload(&mut self, to: C, id: u32, payload: &[u8], put: Put<'_, C>) {
         if let Some(client) = self.clients.iter_mut().find(|known| known.id == to) {
             client.send_payload(id, payload, put);

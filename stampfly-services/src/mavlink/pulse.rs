@@ -1,23 +1,23 @@
-//! Was what comes now held up on its way?
+//! Commands that a network has delayed.
 //!
-//! MAVLink's messages do not say when they were sent, and a program that falls silent may wait for something. But a program says once a second that it is there: when several heartbeats come
-//! at once behind a silence, a network has held them up, and a command behind them may be as old as the silence. A command that was sent before them cannot be told from one that is
-//! fresh.
+//! MAVLink's messages carry no time, and a silent program may be waiting for an answer. But several
+//! heartbeats that arrive together after a silence were sent during it: the commands behind them
+//! may be as old as the silence. A command ahead of them cannot be told from a fresh one.
 
 use stampfly_types::{Duration, Instant};
 
 /// Longest time between two heartbeats of a program that sends one a second.
 const SILENCE: Duration = Duration::from_millis(1_400);
-/// What was held up comes in one piece: after a gap of this length it is over.
+/// Delayed frames arrive within this time of one another.
 const BURST: Duration = Duration::from_millis(100);
-/// So many heartbeats in one piece are none of a program that sends them in time.
+/// Heartbeats in one burst that a program without a delay does not send.
 const HEARTBEATS: u8 = 2;
 
-/// What is known of one client's heartbeats.
+/// The heartbeats of one client.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pulse {
     heard: Instant,
-    /// Is this piece behind a silence, and how many heartbeats are in it?
+    /// Does this burst follow a silence, and how many heartbeats are in it?
     is_behind: bool,
     heartbeats: u8,
 }
@@ -27,7 +27,7 @@ impl Pulse {
         Self { heard: Instant::ZERO, is_behind: false, heartbeats: 0 }
     }
 
-    /// A frame has come.
+    /// A frame has arrived.
     pub fn hear(&mut self, now: Instant, is_heartbeat: bool) {
         if now.since(self.heard) > BURST {
             (self.is_behind, self.heartbeats) = (now.since(self.heard) > SILENCE, 0);
@@ -36,7 +36,7 @@ impl Pulse {
         self.heartbeats = self.heartbeats.saturating_add(u8::from(is_heartbeat));
     }
 
-    /// May what comes now be older than a second?
+    /// May the frames that arrive now be older than a second?
     pub const fn is_held(&self) -> bool {
         self.is_behind && self.heartbeats >= HEARTBEATS
     }

@@ -1,13 +1,14 @@
 //! What a page or another program asks of a vehicle: JSON as it arrives, and what it means.
 //!
-//! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle carries it out and answers with a
-//! [`Reply`].
-//! Nothing here knows a particular vehicle. [`Guided`] becomes the
-//! [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] the [`PilotInput`](stampfly_types::messages::PilotInput) that
-//! every radio link of the project ends in.
+//! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle
+//! carries it out and answers with a [`Reply`]. Nothing here knows a particular vehicle. [`Guided`]
+//! becomes the [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] the
+//! [`PilotInput`](stampfly_types::messages::PilotInput) that every radio link of the project ends
+//! in.
 //!
-//! An ask is a JSON object with `vehicle` (its number), `id` (chosen by the page; the answer repeats it), `do`, and what
-//! belongs to it. With `at` it says when it was asked, so that what was held up on its way is not done:
+//! An ask is a JSON object with `vehicle` (its number), `id` (chosen by the page; the answer
+//! repeats it), `do`, and what belongs to it. With `at` it says when it was asked, so that what was
+//! held up on its way is not done:
 //!
 //! ```
 //! use stampfly_sim::ask::{Ask, Asked, Guided};
@@ -20,8 +21,8 @@
 //! # Ok::<(), stampfly_sim::ask::AskError>(())
 //! ```
 //!
-//! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a text that is too long
-//! refuse the whole ask.
+//! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a
+//! text that is too long refuse the whole ask.
 
 mod guided;
 mod incoming;
@@ -51,7 +52,8 @@ pub struct Asked {
     pub vehicle: usize,
     /// Chosen by the page; the answer carries it.
     pub id: u32,
-    /// When it was asked, ms, by the clock that the server tells its pages. An ask without it counts as asked when it arrives.
+    /// When it was asked, ms, by the clock that the server tells its pages. An ask without it
+    /// counts as asked when it arrives.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<f64>,
     /// What is asked.
@@ -67,7 +69,8 @@ pub enum Ask {
     Guided(Guided),
     /// Sticks and switches, sent again and again while somebody flies by hand. Has no answer.
     Sticks(Sticks),
-    /// Somebody is there: to be said at least every second, or the vehicle takes the link for lost. Has no answer.
+    /// Somebody is there: to be said at least every second, or the vehicle takes the link for lost.
+    /// Has no answer.
     Alive {},
     /// Changes a parameter.
     ParamSet {
@@ -88,7 +91,8 @@ pub enum Ask {
         /// Without its end.
         line: String,
     },
-    /// Turns one motor of the disarmed vehicle, for as long as the vehicle's own limit. Repeated while a button is held.
+    /// Turns one motor of the disarmed vehicle, for as long as the vehicle's own limit. Repeated
+    /// while a button is held.
     MotorTest {
         /// From 1.
         motor: u8,
@@ -97,8 +101,8 @@ pub enum Ask {
     },
     /// Stops the motor test.
     MotorStop {},
-    /// A fault, as [`Fault::parse`](crate::fault::Fault::parse) reads it. One whose time is past (`@0`) begins at once, and
-    /// lasts its seconds from then.
+    /// A fault, as [`Fault::parse`](crate::fault::Fault::parse) reads it. One whose time is past
+    /// (`@0`) begins at once, and lasts its seconds from then.
     Fault {
         /// The text.
         text: String,
@@ -125,7 +129,8 @@ pub enum AskError {
     NotJson,
     /// `vehicle` or `id` is missing or no such number.
     Missing(&'static str),
-    /// Not one of the asks, a field too many or too few, or of another type; the sentence says which.
+    /// Not one of the asks, a field too many or too few, or of another type; the sentence says
+    /// which.
     Unknown(String),
     /// This number is not in its range.
     OutOfRange(&'static str),
@@ -223,7 +228,8 @@ impl Ask {
         }
     }
 
-    /// Is it done whatever its age? What ends a flight or stops a motor is; everything else is not, when it was held up on its way.
+    /// Is it done whatever its age? What ends a flight or stops a motor is; everything else is not,
+    /// when it was held up on its way.
     #[must_use]
     pub const fn is_never_late(&self) -> bool {
         matches!(

@@ -1,12 +1,12 @@
 //! A vehicle in the hands of other programs, in real time or slower or faster.
 //!
-//! Virtual time waits for the wall: the task [`Live::serve`] holds the whole simulation until a tick's time has come, and
-//! hears meanwhile what arrives. A machine that comes too late for a tick loses the time: the vehicle does not hurry after
-//! it, because nobody could steer it there. What is published is in the log, so the flight can be replayed without the
-//! programs.
+//! Virtual time waits for the wall: the task [`Live::serve`] holds the whole simulation until a
+//! tick's time has come, and hears meanwhile what arrives. A machine that comes too late for a tick
+//! loses the time: the vehicle does not hurry after it, because nobody could steer it there. What
+//! is published is in the log, so the flight can be replayed without the programs.
 //!
-//! A vehicle lists its ports ([`PortSpec`]); the program that flies it opens them ([`Ports`]), and the vehicle makes of the
-//! bytes what it wants ([`Link`]). No socket is known here.
+//! A vehicle lists its ports ([`PortSpec`]); the program that flies it opens them ([`Ports`]), and
+//! the vehicle makes of the bytes what it wants ([`Link`]). No socket is known here.
 
 use crate::time::Clock;
 use core::fmt;
@@ -31,12 +31,14 @@ pub enum Transport {
     Tcp,
     /// A serial port that exists in this machine alone: a pseudo-terminal.
     Terminal,
-    /// A page in a browser, which the program that flies the vehicle serves for all vehicles together.
+    /// A page in a browser, which the program that flies the vehicle serves for all vehicles
+    /// together.
     Page,
 }
 
-/// The language of a port. A stream whose first bytes are of another one is ended before anything is made of it: a web page
-/// can open a stream to any port of the machine that shows it, and say what it likes behind the head of its request.
+/// The language of a port. A stream whose first bytes are of another one is ended before anything
+/// is made of it: a web page can open a stream to any port of the machine that shows it, and say
+/// what it likes behind the head of its request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speech {
     /// MAVLink: frames from the first byte on.
@@ -58,9 +60,11 @@ pub enum Speech {
 pub enum Guard {
     /// Nothing: the vehicle only sends there.
     SendsOnly,
-    /// The key: what is not signed or sealed with it does nothing. Without a key the port is not opened for others.
+    /// The key: what is not signed or sealed with it does nothing. Without a key the port is not
+    /// opened for others.
     Key,
-    /// A secret in the address of the page, which is made from the key. Without a key the port is not opened for others.
+    /// A secret in the address of the page, which is made from the key. Without a key the port is
+    /// not opened for others.
     Secret,
     /// The language has no room for a key: the port is on this machine alone.
     Loopback,
@@ -73,8 +77,8 @@ pub struct PortSpec {
     pub name: &'static str,
     /// How bytes come to it.
     pub transport: Transport,
-    /// Its number, unless another is asked for. Of the n-th vehicle from zero: ten times n more, but for
-    /// [`Transport::UdpTo`] and [`Transport::Page`].
+    /// Its number, unless another is asked for. Of the n-th vehicle from zero: ten times n more,
+    /// but for [`Transport::UdpTo`] and [`Transport::Page`].
     pub number: u16,
     /// What is spoken there.
     pub meaning: &'static str,
@@ -131,7 +135,8 @@ impl PortSpec {
         guard: Guard::Key,
         ..Self::tcp("mavlink-tcp", 5_760, Speech::Mavlink, "MAVLink, for programs that connect")
     };
-    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nothing is heard there, and it is not opened.
+    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nothing is
+    /// heard there, and it is not opened.
     pub const SEALED: Self = Self {
         guard: Guard::Key,
         may: STATION,
@@ -175,7 +180,8 @@ pub struct Client {
 /// What is heard of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard<'b> {
-    /// It has connected; at a port of [`Transport::UdpTo`], the address to which datagrams are to be sent.
+    /// It has connected; at a port of [`Transport::UdpTo`], the address to which datagrams are to
+    /// be sent.
     Opened,
     /// A datagram, or the next part of a stream.
     Bytes(&'b [u8]),
@@ -185,11 +191,12 @@ pub enum Heard<'b> {
 
 /// The open ports of one vehicle.
 pub trait Ports: fmt::Debug + Send + Sync {
-    /// Hands over what has come in, in order, and waits for more until then, if at all; a bounded number, so that a flood does not
-    /// hold time up.
+    /// Hands over what has come in, in order, and waits for more until then, if at all; a bounded
+    /// number, so that a flood does not hold time up.
     fn receive(&self, until: Option<std::time::Instant>, hear: &mut dyn FnMut(Client, Heard<'_>));
 
-    /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes nothing is closed.
+    /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes
+    /// nothing is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
 
     /// Tells every page what happens to the vehicle. Nothing by default.
@@ -222,7 +229,8 @@ pub struct Live {
     pub speed: Option<Speed>,
 }
 
-/// Virtual seconds in a second of the wall: 1 is real time, 0 is a pause. A handle: clones share it.
+/// Virtual seconds in a second of the wall: 1 is real time, 0 is a pause. A handle: clones share
+/// it.
 #[derive(Clone, Debug)]
 pub struct Speed(Arc<AtomicU32>);
 
@@ -258,7 +266,8 @@ pub trait Link {
 }
 
 impl Live {
-    /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's zero.
+    /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's
+    /// zero.
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
         let ports = &self.ports;
         let mut pace = self.speed.as_ref().map(|speed| Pace::new(speed, period));
@@ -299,7 +308,8 @@ impl<'s> Pace<'s> {
         while self.speed.get() <= 0.0 && !are_closed() {
             hear(std::time::Instant::now() + PAUSE);
         }
-        // A pause that has just ended is not made up for, and a speed of a hundred thousandth is none.
+        // A pause that has just ended is not made up for, and a speed of a hundred thousandth is
+        // none.
         let period = self.period.div_f32(self.speed.get().max(1e-5));
         self.until = next_tick(self.until, std::time::Instant::now(), period);
         hear(self.until);
@@ -307,7 +317,8 @@ impl<'s> Pace<'s> {
     }
 }
 
-/// When the next tick is due. A late one keeps the plan up to a period, so a sleep that was a little long adds nothing.
+/// When the next tick is due. A late one keeps the plan up to a period, so a sleep that was a
+/// little long adds nothing.
 fn next_tick(last: std::time::Instant, now: std::time::Instant, period: std::time::Duration) -> std::time::Instant {
     (last + period).max(now.checked_sub(period).unwrap_or(now))
 }
