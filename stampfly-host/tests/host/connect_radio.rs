@@ -1,6 +1,8 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
-use crate::connect::{alive, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample};
+use crate::connect::{
+    alive, alone, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample,
+};
 use crate::program::{Program, folder, interrupt};
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
@@ -61,6 +63,7 @@ fn fly(socket: &mut WebSocket<TcpStream>, down: usize) {
 
 #[test]
 fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
+    let _alone = alone();
     let folder = folder("connect", "sealed");
     let (ours, others) = (key(&folder, "ours", 1), key(&folder, "others", 2));
     let (serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -120,6 +123,7 @@ fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
 
 #[test]
 fn a_flight_is_recorded_by_radio_and_replays_bit_for_bit() {
+    let _alone = alone();
     let folder = folder("connect", "sealed_record");
     let ours = key(&folder, "ours", 1);
     let (_serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -188,6 +192,7 @@ fn pass(random: &mut u64, bytes: &mut [u8], send: impl Fn(&[u8])) {
 
 #[test]
 fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
+    let _alone = alone();
     let folder = folder("connect", "sealed_lossy");
     let ours = key(&folder, "ours", 1);
     let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -211,6 +216,7 @@ fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
 
 #[test]
 fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
+    let _alone = alone();
     let folder = folder("connect", "sealed_silent");
     let ours = key(&folder, "ours", 1);
     let ports = ["serve", "--port", "others=off", "--port", "http=0", "--port", "sealed=0", "--key", &ours];
@@ -228,6 +234,7 @@ fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
 
 #[test]
 fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
+    let _alone = alone();
     let folder = folder("connect", "sealed_flood");
     let ours = key(&folder, "ours", 1);
     let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -256,6 +263,7 @@ fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
 
 #[test]
 fn a_key_is_for_the_radio_and_the_radio_wants_one() {
+    let _alone = alone();
     let folder = folder("connect", "keys");
     let ours = key(&folder, "ours", 1);
     for arguments in [&["connect", "udp:127.0.0.1"][..], &["connect", "tcp:127.0.0.1:5763", "--key", &ours]] {

@@ -1,5 +1,6 @@
 //! What comes through the ports of `serve` and does not belong there.
 
+use crate::connect::alone;
 use crate::program::{Program, folder};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -17,6 +18,7 @@ fn served(place: &str) -> Option<TcpStream> {
 
 #[test]
 fn connections_that_only_listen_keep_no_program_out() {
+    let _alone = alone();
     let folder = folder("doors", "silent");
     let (_serving, place) = Program::serve(&folder, "mavlink-tcp=0", &[]);
     let silent: Vec<_> = (0..16).map(|_| served(&place).expect("it listens")).collect();
@@ -28,6 +30,7 @@ fn connections_that_only_listen_keep_no_program_out() {
 
 #[test]
 fn a_connection_that_speaks_http_is_ended_and_said() {
+    let _alone = alone();
     let folder = folder("doors", "http");
     for port in ["mavlink-tcp", "console", "msp", "usb-tcp"] {
         let (mut serving, place) = Program::serve(&folder, &format!("{port}=0"), &[]);
@@ -46,6 +49,7 @@ fn a_connection_that_speaks_http_is_ended_and_said() {
 
 #[test]
 fn a_port_that_commands_is_not_opened_to_others_without_a_key() {
+    let _alone = alone();
     let folder = folder("doors", "others");
     for port in ["http", "mavlink-tcp", "mavlink-udp", "tello", "stream", "console", "msp", "usb-tcp"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stampfly"));
