@@ -284,8 +284,8 @@ impl<H: Hands> Ground<H> {
             Err(refusal) => Err(refusal.to_string()),
         };
         match ask {
-            // A click on the map says where to be, not where to be after everything else.
             Ask::Guided(guided) if let Some(why) = refusal(*guided, &cockpit.view().state()) => Err(why),
+            // A click on the map replaces the way-points that wait: it is flown at once.
             Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, seat, (*go_to).into())),
             Ask::Guided(guided) => said(cockpit.guide(now, seat, (*guided).into())),
             Ask::Sticks(sticks) => said(cockpit.steer(now, seat, &(*sticks).into())),
