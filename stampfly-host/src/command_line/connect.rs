@@ -2,10 +2,11 @@
 
 use crate::command_line::arguments::{ConnectOptions, VehiclePlace};
 use crate::command_line::doctor::port_of;
+use crate::command_line::ended;
 use crate::command_line::failure::Failure;
 use crate::command_line::serve::page_address;
 use crate::connect::{Bridge, PORTS, Place, RadioPlace};
-use crate::ground::{Event, Hub, Limits, Server, VehicleCard};
+use crate::ground::{Hub, Limits, Server, VehicleCard};
 use crate::serve::{Key, OpenPorts, PortOption};
 use crate::vehicles::{self, ForVehicle};
 use stampfly_link::secure;
@@ -73,13 +74,7 @@ impl ForVehicle for Connect<'_> {
         for error in ports.missed() {
             eprintln!("stampfly: {error}; the vehicle is connected without it");
         }
-        let pages = hub.clone();
-        ports.tell(move |ended| {
-            if ended.count.is_power_of_two() {
-                eprintln!("stampfly: {ended}");
-                pages.tell_all(0, &Event::Text { text: ended.to_string() });
-            }
-        });
+        ended::watch(&ports, &hub, 0);
         let mut server = None;
         for (port, address) in ports.places() {
             let does = match port.transport {
@@ -111,9 +106,7 @@ impl ForVehicle for Connect<'_> {
             bridge = bridge.recording(file.clone()).map_err(failed)?;
         }
         let carried = bridge.run(until);
-        if counting.ended() > 0 {
-            eprintln!("{} connections ended that did not speak their port's language", counting.ended());
-        }
+        ended::print_sum([&counting]);
         drop(server);
         if let Some((file, counts)) = options.record.as_ref().zip(carried.record) {
             let [chunks, missing] = counts.map_err(|error| format!("{}: {error}", file.display()))?;

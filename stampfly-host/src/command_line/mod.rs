@@ -19,6 +19,7 @@ mod connect;
 mod demo;
 mod doctor;
 mod doors;
+mod ended;
 mod engine;
 mod estimate;
 mod failure;

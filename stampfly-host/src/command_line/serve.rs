@@ -4,6 +4,7 @@
 //! a vehicle did what it must not.
 
 use crate::command_line::arguments::ServeOptions;
+use crate::command_line::ended;
 use crate::command_line::failure::Failure;
 use crate::command_line::fly::{figures, write_report};
 use crate::flown::{Flown, fly};
@@ -74,7 +75,7 @@ impl ForVehicle for Serve<'_> {
             threads.into_iter().map(thread::ScopedJoinHandle::join).collect()
         });
         over.store(true, Ordering::Relaxed);
-        say_ended(&ports);
+        ended::print_sum(&ports);
         let mut all_well = true;
         for ended in ended {
             for (flown, hash, log) in ended.map_err(|_| "a vehicle's thread has failed")?? {
@@ -83,14 +84,6 @@ impl ForVehicle for Serve<'_> {
             }
         }
         Ok(if all_well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-    }
-}
-
-/// Says how many connections were ended because they spoke another language than their port.
-fn say_ended(ports: &[Arc<OpenPorts>]) {
-    let count: u64 = ports.iter().map(|ports| ports.ended()).sum();
-    if count > 0 {
-        eprintln!("{count} connections ended that did not speak their port's language");
     }
 }
 
@@ -194,14 +187,7 @@ fn open<V: Vehicle>(options: &ServeOptions, hub: &Arc<Hub>) -> Result<Vec<Arc<Op
         for error in opened.missed() {
             eprintln!("stampfly: {}{error}; the vehicle flies without it", which(number));
         }
-        let pages = hub.clone();
-        opened.tell(move |ended| {
-            // Each counts, and some of them are said.
-            if ended.count.is_power_of_two() {
-                eprintln!("stampfly: {ended}");
-                pages.tell_all(number, &Event::Text { text: ended.to_string() });
-            }
-        });
+        ended::watch(&opened, hub, number);
         all.push(Arc::new(opened.with_page(PageOf { hub: hub.clone(), vehicle: number })));
     }
     Ok(all)
