@@ -214,6 +214,14 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     /// The line is gone, with all who command over it.
     pub fn close(&mut self, cockpit: &mut dyn Cockpit) {
         self.mavlink.close((), cockpit);
+        self.forget();
+    }
+
+    /// Forgets what the station has asked for: another may come and use the same numbers.
+    fn forget(&mut self) {
+        self.waits.clear();
+        self.watches.clear();
+        self.desk.clear();
     }
 
     /// Sends what is due: MAVLink's streams fifty times a second at most, and the station's topics.
@@ -221,9 +229,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         self.mavlink.poll(now, cockpit, &mut |(), frame| put(frame));
         self.settle(now, cockpit, put);
         if !self.is_spoken(now) {
-            self.watches.clear();
-            self.desk.clear();
-            return;
+            return self.forget();
         }
         let Self { watches, mavlink, table, .. } = self;
         watches.poll(now, samples, &mut |topic, number, at, words| {

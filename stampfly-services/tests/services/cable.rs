@@ -282,6 +282,24 @@ fn commands_are_acknowledged_or_refused_in_words_and_signs_of_life_are_its_own()
 }
 
 #[test]
+fn a_station_that_connects_anew_gets_no_answers_to_what_the_one_before_it_asked() {
+    let mut line = Line::new();
+    line.ask(&Payload::Watch { topic: Id::estimate_state as u16, period: 50 }, 1);
+    line.ask(&Payload::Guided(GuidedCommand { kind: GuidedKind::Arm, ..GuidedCommand::default() }), 2);
+    line.ask(&Payload::Line("help"), 3);
+    line.heard();
+    line.cable.close(&mut line.vehicle);
+    line.ask(&Payload::Watch { topic: Id::sensor_tof as u16, period: 50 }, 9);
+    line.vehicle.status(|status| status.armed = true);
+    for _ in 0..200 {
+        line.vehicle.publish_at(line.now, Id::estimate_state, &StateEstimate::default());
+        line.turn();
+    }
+    let heard = line.heard();
+    assert!(heard.len() == 1 && heard[0].0 == 9, "{heard:?}");
+}
+
+#[test]
 fn topics_come_as_often_as_asked_for_and_no_sample_twice() {
     let mut line = Line::new();
     line.ask(&Payload::Watch { topic: Id::estimate_state as u16, period: 50 }, 1);
