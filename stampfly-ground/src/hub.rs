@@ -41,18 +41,19 @@ use std::time::Duration;
 const ASKS: usize = 192;
 /// More of them, for those that stop motors.
 const ROOM_TO_STOP: usize = 64;
-/// Sessions that are known: a page that was away for long begins anew.
+/// Most sessions that the hub remembers. A page whose session was dropped for newer ones starts a
+/// new session.
 const SESSIONS: usize = 64;
-/// Clients that have gone and that a vehicle has not looked at.
+/// Most clients that have left and that a vehicle has not been told of.
 const CLIENTS: usize = 256;
 /// Texts that wait for one client.
 const TEXTS: usize = 512;
 /// Events that a page which comes later is told.
 const EVENTS: usize = 64;
 
-/// What is older when the vehicle is to carry it out is refused: a person who has clicked has seen
-/// by then that nothing came of it. Half of a second for a network that is slow, and as much for a
-/// flight that is.
+/// Greatest age of an ask when the vehicle takes it; the hub refuses an older one, because the
+/// person who clicked has seen by then that nothing happened. Half of it is for a slow network, half
+/// for a slow simulation.
 pub const FRESH: Duration = Duration::from_secs(1);
 /// A page whose clock is ahead of the server's by more counts wrongly.
 const AHEAD: Duration = Duration::from_millis(100);

@@ -36,19 +36,20 @@ const AT_ONCE: usize = 4;
 /// Words of the longest message that is sent.
 const WORDS: usize = 64;
 
-/// Commands that wait to be seen. More are acknowledged when they are taken.
+/// Most commands whose acknowledgement waits until the vehicle's state shows their effect. Further
+/// ones are acknowledged when the vehicle takes them.
 const WAITS: usize = 4;
-/// What is older is not done: a line that was held up brings no command afterwards.
+/// Greatest age of a command, ms. An older one was held up on the line, and is refused.
 const FRESH_MS: i32 = 1_000;
 const LATE: &str = "expired: it came more than a second late, and was not done";
 
-/// Was this said too long ago? What seems to be said in the future is not: a station counts on
-/// while a simulated vehicle's time is slower.
+/// Is this time, ms of the vehicle's clock, more than [`FRESH_MS`] ago? A time in the future is not:
+/// a station's clock runs ahead of a simulated vehicle on a slow machine.
 const fn is_late(now: Instant, said: u32) -> bool {
     ((now.as_micros() / 1_000) as u32).wrapping_sub(said) as i32 > FRESH_MS
 }
 
-/// What ends a flight is done whatever its age.
+/// Landing and motors off are carried out whatever their age.
 fn is_never_late(payload: &Payload<'_>) -> bool {
     payload.is_kill() || payload.command().is_some_and(|command| command.kind == GuidedKind::Land)
 }
