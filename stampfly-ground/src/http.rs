@@ -4,8 +4,8 @@
 //! the page, a log, and the handshake of a WebSocket (RFC 6455 section 4.2). Everything else is a
 //! [`Refusal`]. Not a general server: no bodies, no encodings, one request a connection.
 //!
-//! What a page of somebody else's must not do from the same browser is refused here: a `Host` that
-//! is a name (DNS rebinding needs one), and an `Origin` that is not this very server.
+//! It refuses requests that a page of another site makes in the same browser: those whose `Host` is
+//! a name (DNS rebinding needs one), and those whose `Origin` is not this server.
 
 use std::fmt;
 use std::net::IpAddr;
