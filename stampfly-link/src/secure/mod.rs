@@ -61,7 +61,9 @@
 //!
 //! A frame that is not used within 200 ms of its making is not used: a vehicle says what its clock is, the station goes on
 //! counting from there, and its frames say when they were sealed. The estimate is never ahead of the vehicle's clock, so no
-//! frame passes for younger than it is. A kill is used whatever its age.
+//! frame passes for younger than it is. A kill is used whatever its age. When the vehicle's clock loses time, as a simulator's
+//! does that is held up, the station's frames are from its future: the vehicle refuses them, and offers a new session, whose
+//! handshake gives the station the clock again.
 //!
 //! # What is lost
 //!

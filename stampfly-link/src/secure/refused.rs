@@ -24,7 +24,7 @@ pub enum Refused {
     Tag,
     /// Authentic, but not of its kind's length, or with a value that must not be used.
     Content,
-    /// Sealed in the future, which no clock of a station is.
+    /// Sealed in the future of the vehicle, whose clock has lost time: it offers a new session.
     Future,
     /// Sealed too long ago.
     Stale,

@@ -206,6 +206,9 @@ impl Vehicle {
         }
         let payload = Payload::decode(header.kind, body).ok_or(Refused::Content)?;
         let age = tick.age(now);
+        // This clock has lost time against the station's, as a simulator's does that was held up.
+        // The next handshake tells the station the time anew; without one it would stay ahead.
+        self.renew |= age.is_none();
         if !payload.is_kill() {
             if age.ok_or(Refused::Future)? > MAX_AGE {
                 return Err(Refused::Stale);

@@ -67,6 +67,8 @@ pub struct Air {
     pub vehicle: Vehicle,
     pub station: Station,
     pub now: Instant,
+    /// What the vehicle's clock has lost.
+    pub lost: Duration,
     pub random: Random,
     /// All that was on the air.
     pub captured: Vec<(To, Vec<u8>)>,
@@ -82,6 +84,7 @@ impl Air {
             station: Station::new(key.clone()),
             key,
             now: Instant::from_secs(1),
+            lost: Duration::ZERO,
             random: Random(seed),
             captured: Vec::new(),
             numbers: Default::default(),
@@ -115,16 +118,23 @@ impl Air {
         }
     }
 
+    /// The vehicle's clock.
+    fn vehicle_now(&self) -> Instant {
+        Instant::ZERO + self.now.since(Instant::ZERO + self.lost)
+    }
+
     /// What both ends send in one turn.
     fn exchange(&mut self) -> Vec<(To, Vec<u8>)> {
         let mut room = [0; MAX_FRAME];
         let mut sent = Vec::new();
-        let random = self.random.eight();
-        if let Some(frame) = self.vehicle.transmit(self.now, random, &mut room) {
+        let (random, vehicle_now) = (self.random.eight(), self.vehicle_now());
+        if let Some(frame) = self.vehicle.transmit(vehicle_now, random, &mut room) {
             sent.push((To::Station, frame.to_vec()));
         }
         let telemetry = Payload::Telemetry(TelemetryPacket::default());
-        sent.extend(self.vehicle.seal(self.now, &telemetry, &mut room).ok().map(|frame| (To::Station, frame.to_vec())));
+        sent.extend(
+            self.vehicle.seal(vehicle_now, &telemetry, &mut room).ok().map(|frame| (To::Station, frame.to_vec())),
+        );
         let random = self.random.eight();
         if let Some(frame) = self.station.transmit(self.now, random, &mut room) {
             sent.push((To::Vehicle, frame.to_vec()));
@@ -145,7 +155,7 @@ impl Air {
     pub fn deliver(&mut self, to: To, frame: &[u8]) -> Result<bool, Refused> {
         let mut frame = frame.to_vec();
         match to {
-            To::Vehicle => self.vehicle.receive(self.now, &mut frame).map(|received| received.is_some()),
+            To::Vehicle => self.vehicle.receive(self.vehicle_now(), &mut frame).map(|received| received.is_some()),
             To::Station => self.station.receive(self.now, &mut frame).map(|received| received.is_some()),
         }
     }

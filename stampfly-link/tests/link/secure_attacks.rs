@@ -557,6 +557,27 @@ fn l12_what_was_held_up_for_longer_than_200_ms_is_not_used() {
     assert_eq!(air.deliver(To::Vehicle, &ahead), Err(Refused::Future));
 }
 
+/// A simulator that is held up loses time. What the station seals is from the future then, until it
+/// has the vehicle's clock from another handshake.
+#[test]
+fn l12_a_vehicle_whose_clock_lost_time_is_commanded_again_soon() {
+    for lost in [30, 100, 900, 5_000] {
+        let mut air = Air::joined(12);
+        air.run(Duration::from_secs(10));
+        let session = air.vehicle.session();
+        air.lost = Duration::from_millis(lost);
+        let frame = air.seal(&sticks());
+        assert_eq!(air.deliver(To::Vehicle, &frame), Err(Refused::Future), "{lost}");
+        air.run(Duration::from_millis(300));
+        let frame = air.seal(&sticks());
+        assert_eq!(air.deliver(To::Vehicle, &frame), Ok(true), "{lost}");
+        // One handshake, and the session that it gave stays.
+        let renewed = air.vehicle.session();
+        air.run(Duration::from_secs(10));
+        assert!(renewed != session && air.vehicle.session() == renewed);
+    }
+}
+
 /// Whatever is held up on the way to the station, and however its clock runs: the age is never less than it is, and not
 /// much more as long as something comes through.
 #[test]
