@@ -1,9 +1,9 @@
 //! A vehicle in the hands of other programs, in real time or slower or faster.
 //!
 //! Virtual time waits for the wall: the task [`Live::serve`] holds the whole simulation until a
-//! tick's time has come, and hears meanwhile what arrives. A machine that comes too late for a tick
-//! loses the time: the vehicle does not hurry after it, because nobody could steer it there. What
-//! is published is in the log, so the flight can be replayed without the programs.
+//! tick's time has come, and hears meanwhile what arrives. Ticks that come late keep the plan, up to
+//! a quarter of a second; after a longer stop the plan begins anew. What is published is in the
+//! log, so the flight can be replayed without the programs.
 //!
 //! A vehicle lists its ports ([`PortSpec`]); the program that flies it opens them ([`Ports`]), and
 //! the vehicle makes of the bytes what it wants ([`Link`]). No socket is known here.
@@ -305,13 +305,20 @@ impl<'s> Pace<'s> {
 
     /// Waits for the next tick, and has programs heard meanwhile.
     fn wait(&mut self, hear: &mut dyn FnMut(std::time::Instant), are_closed: &dyn Fn() -> bool) {
-        while self.speed.get() <= 0.0 && !are_closed() {
+        let speed = loop {
+            let speed = self.speed.get();
+            if speed > 0.0 {
+                break speed;
+            }
+            if are_closed() {
+                return;
+            }
             hear(std::time::Instant::now() + PAUSE);
             // A pause is not made up for.
             self.until = std::time::Instant::now();
-        }
+        };
         // A speed of a hundred thousandth is none.
-        let period = self.period.div_f32(self.speed.get().max(1e-5));
+        let period = self.period.div_f32(speed.max(1e-5));
         self.until = next_tick(self.until, std::time::Instant::now(), period);
         hear(self.until);
         std::thread::sleep(self.until.saturating_duration_since(std::time::Instant::now()));
@@ -319,9 +326,9 @@ impl<'s> Pace<'s> {
 }
 
 /// Greatest delay that later ticks make up for. A busy machine runs a thread late by tens of
-/// milliseconds, and stations count on from the vehicle's clock; after a stop of a second their
-/// commands are too old anyway, and a person has not seen the vehicle fly meanwhile.
-const MADE_UP: std::time::Duration = std::time::Duration::from_secs(1);
+/// milliseconds, and stations count on from the vehicle's clock. Ticks that catch up hear no new
+/// sticks, so all of them together stay below the 500 ms after which vehicles call a link silent.
+const MADE_UP: std::time::Duration = std::time::Duration::from_millis(250);
 
 /// When the next tick is due: a period after the one before, or earlier than now when that was late.
 fn next_tick(last: std::time::Instant, now: std::time::Instant, period: std::time::Duration) -> std::time::Instant {
@@ -331,7 +338,7 @@ fn next_tick(last: std::time::Instant, now: std::time::Instant, period: std::tim
 
 #[cfg(test)]
 mod tests {
-    use super::next_tick;
+    use super::{Pace, Speed, next_tick};
     use std::time::{Duration, Instant};
 
     #[test]
@@ -340,7 +347,25 @@ mod tests {
         let next = |now| next_tick(begun, begun + ms(now), ms(10)).duration_since(begun);
         assert_eq!(next(0), ms(10));
         assert_eq!(next(19), ms(10), "a little late");
-        assert_eq!(next(1_000), ms(10), "a busy machine");
-        assert_eq!(next(1_100), ms(1_100), "a stop");
+        assert_eq!(next(260), ms(10), "a busy machine");
+        assert_eq!(next(300), ms(300), "a stop");
+    }
+
+    #[test]
+    fn a_pause_ends_when_the_ports_close() {
+        let speed = Speed::new(0.0);
+        let mut pace = Pace::new(&speed, stampfly_types::Duration::from_micros(2_500));
+        let mut heard = 0;
+        let begun = Instant::now();
+        let closed = std::cell::Cell::new(false);
+        pace.wait(
+            &mut |_| {
+                heard += 1;
+                closed.set(heard == 3);
+            },
+            &|| closed.get(),
+        );
+        assert_eq!(heard, 3);
+        assert!(begun.elapsed() < Duration::from_secs(60));
     }
 }
