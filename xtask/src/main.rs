@@ -140,6 +140,8 @@ const STEPS: &[Step] = &[
         steps::search::run,
     )
     .accepting(&[Seconds]),
+    Step::nightly("load", "Load every port for half an hour, or for SECONDS: all are served", steps::load::run)
+        .accepting(&[Rest]),
     Step::nightly("soak", "Watch ten vehicles for half an hour, or for SECONDS", steps::soak::run).accepting(&[Rest]),
     Step::nightly(
         "campaign",

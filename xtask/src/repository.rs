@@ -177,14 +177,14 @@ pub fn capture(command: &mut Command) -> Result<(String, String), Failure> {
     }
 }
 
-/// A program of a Python package of this version, `NAME==VERSION`, which is installed into a place of its own when it is
-/// missing.
-pub fn python_tool(repository: &Repository, package: &str, tool: &str) -> Result<Command, Failure> {
-    let place = repository.target("python").join(package.replace("==", "-"));
+/// A program of Python packages of these versions, `NAME==VERSION NAME==VERSION`, which are installed into a place of their own
+/// when it is missing.
+pub fn python_tool(repository: &Repository, packages: &str, tool: &str) -> Result<Command, Failure> {
+    let place = repository.target("python").join(packages.replace("==", "-").replace(' ', "+"));
     let program = |name: &str| place.join("bin").join(name).to_string_lossy().into_owned();
     if !Path::new(&program(tool)).exists() {
         run(repository.command("python3").args(["-m", "venv"]).arg(&place))?;
-        run(repository.command(&program("pip")).args(["install", "--quiet", package]))?;
+        run(repository.command(&program("pip")).args(["install", "--quiet"]).args(packages.split(' ')))?;
     }
     Ok(repository.command(&program(tool)))
 }

@@ -27,6 +27,7 @@ pub mod golden;
 pub mod ground;
 pub mod hals;
 pub mod hil;
+pub mod load;
 pub mod loom;
 pub mod machine;
 pub mod memory;
