@@ -99,6 +99,13 @@ pub enum Event {
         /// What has happened.
         text: String,
     },
+    /// Who commands has changed. Pages that come later are told with the first text.
+    Commander {
+        /// In words; empty when no program does.
+        who: String,
+        /// The number of its page, if it is one.
+        page: Option<u64>,
+    },
     /// Virtual time runs this much faster than the wall's.
     Speed {
         /// 0 while it stands.
@@ -176,6 +183,8 @@ struct Shared {
     newest: Arc<Newest>,
     asks: Mutex<VecDeque<Waiting>>,
     log: Mutex<Option<Arc<LogSource>>>,
+    /// Who commands, as pages were told last.
+    commander: Mutex<Value>,
     /// Clients that have gone, and that the vehicle was not told of.
     gone: Mutex<Vec<Client>>,
     /// Sticks that found the queue full.
@@ -215,6 +224,7 @@ impl Hub {
                 card: Mutex::new(card),
                 asks: Mutex::default(),
                 log: Mutex::default(),
+                commander: Mutex::new(json!({ "who": "", "page": null })),
                 gone: Mutex::default(),
                 sticks_lost: AtomicU64::new(0),
             }
@@ -289,7 +299,7 @@ impl Hub {
     }
 
     /// Tells all pages, and those that come later as far as it is among the last sixty-four events.
-    /// A parameter's new value is on the card from now on.
+    /// A parameter's new value is on the card from now on, and so is who commands.
     pub fn tell_all(&self, vehicle: usize, event: &Event) {
         let Some(shared) = self.vehicles.get(vehicle) else { return };
         if let Event::Parameter { name, value } = event {
@@ -298,11 +308,14 @@ impl Hub {
                 row.value = *value;
             }
         }
+        if let Event::Commander { who, page } = event {
+            *lock(&shared.commander) = json!({ "who": who, "page": page });
+        }
         let mut body = serde_json::to_value(event).unwrap_or_default();
         body["vehicle"] = vehicle.into();
         body["at"] = seconds(shared.newest.clock()).into();
         let text: Arc<str> = json!({ "event": body }).to_string().into();
-        if !matches!(event, Event::Parameter { .. }) {
+        if !matches!(event, Event::Parameter { .. } | Event::Commander { .. }) {
             let mut events = lock(&self.events);
             if events.len() >= EVENTS {
                 events.pop_front();
@@ -425,7 +438,11 @@ impl Hub {
     /// The first thing a page is told.
     #[must_use]
     pub fn hello(&self, page: Client, session: &str, now: Duration) -> String {
-        let cards = self.vehicles.iter().enumerate().map(|(number, shared)| lock(&shared.card).json(number));
+        let cards = self.vehicles.iter().enumerate().map(|(number, shared)| {
+            let mut card = lock(&shared.card).json(number);
+            card["commander"] = lock(&shared.commander).clone();
+            card
+        });
         let cards: Vec<Value> = cards.collect();
         let (version, words) = (env!("CARGO_PKG_VERSION"), card::words());
         let (page, now) = (page.number(), now.as_secs_f64() * 1e3);
@@ -656,6 +673,22 @@ mod tests {
         drop(deaf);
         assert_eq!(lock(&hub.clients).len(), 1);
         assert_eq!(hub.connect().take().len(), EVENTS, "the newest events of the past");
+    }
+
+    #[test]
+    fn a_page_that_comes_later_is_told_who_commands() {
+        let hub = hub();
+        let (first, told) = (hub.connect(), |hub: &Hub| {
+            let hello: Value = serde_json::from_str(&hub.hello(Client::of(1), "", NOW)).expect("JSON");
+            hello["hello"]["vehicles"][1]["commander"].clone()
+        });
+        assert_eq!(told(&hub), json!({ "who": "", "page": null }));
+        hub.tell_all(1, &Event::Commander { who: "page 7".into(), page: Some(7) });
+        assert!(first.take()[0].contains(r#""kind":"commander""#));
+        assert_eq!(told(&hub), json!({ "who": "page 7", "page": 7 }));
+        assert!(hub.connect().take().is_empty(), "no event of the past");
+        hub.tell_all(1, &Event::Commander { who: String::new(), page: None });
+        assert_eq!(told(&hub), json!({ "who": "", "page": null }));
     }
 
     #[test]

@@ -145,6 +145,8 @@ pub struct Ground<H> {
     faults: Injector,
     /// What was asked of the vehicle, and told to pages.
     told: u32,
+    /// Who commands, as pages were told last.
+    commander: Option<Option<Seat>>,
     /// What pages have asked, and is not seen yet.
     waits: Vec<(Client, Asked, Waited)>,
     /// What the vehicle does for them.
@@ -181,6 +183,7 @@ impl<H: Hands> Ground<H> {
             speed: live.speed.clone(),
             faults: faults.clone(),
             told: 0,
+            commander: None,
             waits: Vec::new(),
             hands,
         }
@@ -346,6 +349,11 @@ impl<H: Hands> Ground<H> {
 
     /// Sends what is due. Call it at every turn.
     pub fn answer(&mut self, now: Instant, samples: &dyn Samples, put: Put<'_>) {
+        let holder = self.helm.holder(now);
+        if self.commander.replace(holder) != Some(holder) {
+            let page = if let Some(Seat::Page(number)) = holder { Some(number) } else { None };
+            self.ports.tell_commander(&holder.map(|seat| seat.to_string()).unwrap_or_default(), page);
+        }
         let Self { helm, places, hands, mavlink, ports, told, waits, .. } = self;
         let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
         waits.retain(|(client, asked, waited)| match waited.look(now, &cockpit) {

@@ -157,6 +157,11 @@ impl Page for PageOf {
     fn tell(&self, text: &str) {
         self.hub.tell_all(self.vehicle, &Event::Text { text: text.to_owned() });
     }
+
+    fn tell_commander(&self, who: &str, page: Option<u32>) {
+        let event = Event::Commander { who: who.to_owned(), page: page.map(u64::from) };
+        self.hub.tell_all(self.vehicle, &event);
+    }
 }
 
 /// A page has no address of its own: its number, written as one.

@@ -86,6 +86,9 @@ pub trait Page: Send + Sync {
 
     /// Tells every page.
     fn tell(&self, text: &str);
+
+    /// Tells every page who commands.
+    fn tell_commander(&self, who: &str, page: Option<u32>);
 }
 
 /// The open ports of one vehicle.
@@ -351,6 +354,12 @@ impl Ports for OpenPorts {
     fn tell(&self, text: &str) {
         if let Some((_, page)) = &self.page {
             page.tell(text);
+        }
+    }
+
+    fn tell_commander(&self, who: &str, number: Option<u32>) {
+        if let Some((_, page)) = &self.page {
+            page.tell_commander(who, number);
         }
     }
 

@@ -202,6 +202,10 @@ pub trait Ports: fmt::Debug + Send + Sync {
     /// Tells every page what happens to the vehicle. Nothing by default.
     fn tell(&self, _text: &str) {}
 
+    /// Tells every page who commands, in words, and the number of its page if it is one. Empty when
+    /// no program does. Nothing by default.
+    fn tell_commander(&self, _who: &str, _page: Option<u32>) {}
+
     /// Do only programs on this machine reach that port?
     fn is_local(&self, _port: usize) -> bool {
         true

@@ -93,12 +93,16 @@ const buildControls = () => {
   }, { capture: true });
 };
 
-/** What a vehicle does not offer cannot be pressed, and says why. */
+/** What a vehicle does not offer, or could not do at once, cannot be pressed, and says why. */
 const offer = (vehicle) => {
   for (const node of document.querySelectorAll('[data-needs]')) {
-    const offers = !vehicle.isLog && vehicle.card.offers.includes(node.dataset.needs);
-    node.disabled = !offers;
-    node.title = offers ? '' : vehicle.isLog ? 'A recorded flight' : 'Not offered by this vehicle';
+    // Motors are stopped of the vehicle that flies, also while a log is in front of it.
+    const asked = node.id === 'kill' ? station.vehicles[station.chosen] ?? vehicle : vehicle;
+    const ends = ['kill', 'land'].includes(node.id);
+    const offers = !asked.isLog && asked.card.offers.includes(node.dataset.needs);
+    const isOld = old !== '' && !ends;
+    node.disabled = !offers || isOld;
+    node.title = !offers ? (asked.isLog ? 'A recorded flight' : 'Not offered by this vehicle') : isOld ? old : '';
   }
   // What no real vehicle can do is not shown for one.
   for (const node of document.querySelectorAll('[data-only]')) {

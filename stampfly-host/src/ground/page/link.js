@@ -1,7 +1,7 @@
 // The WebSocket: what the server tells, what the page asks, and how well it goes.
 
 const RATE = 50;
-const link = { session: null, socket: null, next: 1, waiting: new Map(), texts: 0, dropped: 0, rate: 0, delay: NaN, since: 0, isOpen: false };
+const link = { session: null, page: null, socket: null, heard: 0, next: 1, waiting: new Map(), texts: 0, dropped: 0, rate: 0, delay: NaN, since: 0, isOpen: false };
 const listeners = { hello: [], state: [], event: [], link: [] };
 const on = (kind, listener) => listeners[kind].push(listener);
 const tell = (kind, value) => listeners[kind].forEach((listener) => listener(value));
@@ -18,10 +18,19 @@ const hearClock = (now) => {
 };
 const serverTime = () => (link.clock ? { at: Math.max(0, Math.round(link.clock.now + (performance.now() - link.clock.here) * (1 - DRIFT))) } : {});
 
+// A server that is there says something fifty times a second. What it said last is old after this time, and nothing more is asked.
+const OLD = 1000;
+/** Is the server heard, and its clock known? */
+const isHeard = () => link.isOpen && (!watchesLink || (link.clock !== null && performance.now() - link.heard <= OLD));
+
+/** What ends a flight is right at any time: it is sent although nothing is heard. */
+const endsAFlight = (what) => what.do === 'motor_stop' || (what.do === 'guided' && ['kill', 'land'].includes(what.kind));
+
 /** Asks something; the promise is the reply, `{ok, text, value}`. Never rejected. */
 const ask = (vehicle, what) => new Promise((resolve) => {
   const id = link.next++;
-  if (!link.isOpen) { resolve({ ok: false, text: 'not connected' }); return; }
+  if (!link.isOpen) { resolve({ ok: false, text: 'not connected: it was not sent' }); return; }
+  if (vehicle !== null && !isHeard() && !endsAFlight(what)) { resolve({ ok: false, text: 'the server is not heard: it was not sent' }); return; }
   const timer = setTimeout(() => {
     link.waiting.delete(id);
     resolve({ ok: false, text: 'no answer' });
@@ -61,18 +70,18 @@ const connect = () => {
   link.clock = null;
   link.last = performance.now();
   socket.addEventListener('open', () => { if (socket === link.socket) { link.isOpen = true; link.last = performance.now(); tell('link', true); } });
-  socket.addEventListener('message', (event) => { if (socket === link.socket) { link.last = performance.now(); heard(event.data); } });
+  socket.addEventListener('message', (event) => { if (socket === link.socket) { link.last = link.heard = performance.now(); heard(event.data); } });
   socket.addEventListener('close', () => { if (socket === link.socket) giveUp(); });
 };
 
-/** The connection is gone, or says nothing: what is waited for will not come, and a new one is tried. */
+/** The connection is gone, or says nothing: no answer will come, and a new connection is tried. What was asked just before may have been done. */
 const giveUp = () => {
   const socket = link.socket;
   link.socket = null;
   link.isOpen = false;
   for (const { resolve, timer } of link.waiting.values()) {
     clearTimeout(timer);
-    resolve({ ok: false, text: 'the connection broke: it is not done' });
+    resolve({ ok: false, text: 'the connection broke before an answer: look whether it was done' });
   }
   link.waiting.clear();
   socket?.close();
@@ -80,18 +89,18 @@ const giveUp = () => {
   setTimeout(connect, 500);
 };
 
-// A server that is there says something fifty times a second.
+// After this time another connection is tried.
 const SILENT = 2000;
 const watchLink = () => { if (link.isOpen && performance.now() - link.last > SILENT) giveUp(); };
 if (watchesLink) setInterval(watchLink, 250);
 
 // The page goes on as who it was before its connection broke, so that it keeps the vehicle that it flies.
 on('hello', ({ page }) => {
-  const before = link.session;
-  link.page = page?.number;
+  const { session: before, page: number } = link;
+  link.page = page?.number ?? null;
   link.session = page?.session || null;
   if (!before || !link.session || before === link.session) return;
-  ask(null, { do: 'resume', session: before }).then(({ ok }) => { if (ok) link.session = before; });
+  ask(null, { do: 'resume', session: before }).then(({ ok }) => { if (ok) Object.assign(link, { session: before, page: number }); });
 });
 
 const SIGN_OF_LIFE = 500;

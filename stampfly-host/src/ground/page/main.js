@@ -56,6 +56,7 @@ on('state', (state) => {
     const vehicle = station.vehicles[number];
     if (!vehicle) continue;
     if (clock < vehicle.clock) forget(vehicle);
+    if (clock !== vehicle.clock) vehicle.moved = performance.now();
     vehicle.clock = clock;
     for (const [place, count, at, ...values] of samples) {
       const topic = vehicle.list[place];
@@ -80,6 +81,8 @@ on('event', (event) => {
   } else if (event.kind === 'speed') {
     element('speed').value = String(event.factor);
     log(`time ×${event.factor}`);
+  } else if (event.kind === 'commander') {
+    vehicle.commander = event;
   } else if (event.kind === 'link') {
     vehicle.away = event.up ? '' : event.text;
     log(`${vehicle.card.name}: ${event.text}`, event.up ? '' : 'bad');
@@ -148,7 +151,9 @@ buildSticks();
 buildPanels();
 buildPlayback();
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { styles = getComputedStyle(document.documentElement); });
+setInterval(writeOld, 200);
 setInterval(() => {
+  measureLink();
   writeLink();
   if (selected()) writeRates(selected());
 }, 1000);

@@ -21,20 +21,54 @@ const setText = (node, text) => { if (node.textContent !== text) node.textConten
 const isArmed = (vehicle) => Boolean(vehicle && field(vehicle, 'flight_status', 'armed')?.[0]);
 const phaseOf = (vehicle) => named(vehicle, 'flight_status', 'phase');
 
+/** Why what is shown of a vehicle is not how it is now; empty when it is. */
+const whyOld = (vehicle) => {
+  if (!vehicle || vehicle.isLog) return '';
+  if (watchesLink && !isHeard()) return 'Nothing is heard of the server';
+  if (vehicle.ended) return '';
+  // A simulated vehicle's time may stand. A real one's does not.
+  const stands = !vehicle.card.offers.includes('speed') && performance.now() - vehicle.moved > OLD;
+  return vehicle.away || stands ? 'Nothing is heard of the vehicle' : '';
+};
+
+let old = '';
+/** Shows that what is shown is old, and lets nothing be asked meanwhile; called several times a second. */
+const writeOld = () => {
+  const vehicle = selected();
+  const why = whyOld(vehicle);
+  if (watchesLink && (why !== '') !== (old !== '')) writeLink();
+  if (why === old) return;
+  old = why;
+  document.body.classList.toggle('old', why !== '');
+  setText(element('old-why'), why);
+  element('old').hidden = why === '';
+  if (vehicle) offer(vehicle);
+};
+
+/** Who commands, in words. */
+const commanderOf = (vehicle) => {
+  const source = named(vehicle, 'flight_status', 'commander') ?? 'None';
+  const { who = '', page = null } = vehicle.commander ?? {};
+  const program = !watchesLink || (page !== null && page === link.page) ? 'this page' : who;
+  if (source === 'Guided') return program ? `flown by ${program}` : 'none commands';
+  if (source !== 'None') return `flown by ${plain(source)}`;
+  return page === null ? '' : `${program} commands`;
+};
+
 const writeStatus = (vehicle) => {
+  const isOld = whyOld(vehicle) !== '';
   const [phase, mode] = [phaseOf(vehicle), named(vehicle, 'flight_status', 'mode')];
-  setText(element('phase'), vehicle.ended ? 'flight over' : vehicle.away ? 'not heard' : phase ? (PHASES[phase] ?? plain(phase)) : 'no state yet');
-  element('phase').classList.toggle('bad', Boolean(vehicle.away));
-  setText(element('armed'), phase === null || vehicle.away ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
+  setText(element('phase'), vehicle.ended ? 'flight over' : isOld ? 'not heard' : phase ? (PHASES[phase] ?? plain(phase)) : 'no state yet');
+  element('phase').classList.toggle('bad', isOld);
+  setText(element('armed'), phase === null || isOld ? '' : isArmed(vehicle) ? 'ARMED' : 'disarmed');
   element('armed').className = isArmed(vehicle) ? 'chip armed' : 'chip';
   setText(element('mode'), mode ? MODES[mode] ?? plain(mode) : '');
   // What comes next stands out.
-  const next = vehicle.isLog ? '' : !isArmed(vehicle) ? 'arm' : phase === 'Armed' ? 'take-off' : 'land';
+  const next = vehicle.isLog || isOld ? '' : !isArmed(vehicle) ? 'arm' : phase === 'Armed' ? 'take-off' : 'land';
   for (const id of ['arm', 'take-off', 'land']) element(id).classList.toggle('main', id === next);
-  const commander = named(vehicle, 'flight_status', 'commander');
-  setText(element('commander'), commander && commander !== 'None' ? `by ${plain(commander)}` : '');
+  setText(element('commander'), isOld ? '' : commanderOf(vehicle));
   const blocks = named(vehicle, 'flight_status', 'blocks') ?? [];
-  const isIdle = !isArmed(vehicle) && phase !== null && !vehicle.away;
+  const isIdle = !isArmed(vehicle) && phase !== null && !isOld;
   setList(element('blocks'), isIdle ? blocks.map((name) => words.blocks[name] ?? plain(name)) : []);
   element('ready').hidden = !(isIdle && blocks.length === 0 && !vehicle.isLog);
   element('blocked').hidden = !(isIdle && blocks.length > 0);
@@ -56,10 +90,9 @@ const writeStatus = (vehicle) => {
 };
 
 const writeLink = () => {
-  measureLink();
   const node = element('link');
-  node.className = link.isOpen ? (link.rate < RATE * 0.7 ? 'chip weak' : 'chip good') : 'chip bad';
-  const parts = [`${Math.round(link.rate)} Hz`];
+  node.className = !isHeard() ? 'chip bad' : link.rate < RATE * 0.7 ? 'chip weak' : 'chip good';
+  const parts = [isHeard() ? `${Math.round(link.rate)} Hz` : 'silent'];
   if (Number.isFinite(link.delay)) parts.push(`${Math.round(link.delay)} ms`);
   if (link.dropped) parts.push(`${link.dropped} dropped`);
   setText(node, link.isOpen ? parts.join(' · ') : 'not connected');

@@ -17,7 +17,7 @@ const makeVehicle = (card, number) => {
   const topics = new Map(card.topics.map((topic) => [topic.name, {
     ...topic, places: layout(topic.fields), at: 0, count: 0, values: null, rate: 0,
   }]));
-  const vehicle = { card, number, topics, list: [...topics.values()], clock: 0, times: [], columns: new Map(), goal: null, ended: '', away: '' };
+  const vehicle = { card, number, topics, list: [...topics.values()], clock: 0, times: [], columns: new Map(), goal: null, ended: '', away: '', moved: performance.now(), commander: card.commander };
   vehicle.plots = plotsOf(vehicle);
   for (const getter of Object.entries(motionOf(vehicle))) vehicle.columns.set(getter[0], { get: getter[1], values: [] });
   for (const plot of vehicle.plots) for (const line of plot.lines) vehicle.columns.set(line.key, { get: line.get, values: [] });
