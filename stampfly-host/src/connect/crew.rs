@@ -30,12 +30,27 @@ const READS: [u32; 6] = [
     TIMESYNC_DATA::ID,
 ];
 
+/// Lands the vehicle, or stops its motors: right at any time.
+pub(super) fn ends_a_flight(frame: &MavMessage) -> bool {
+    let (command, first) = match frame {
+        MavMessage::COMMAND_LONG(data) => (data.command, data.param1),
+        MavMessage::COMMAND_INT(data) => (data.command, data.param1),
+        _ => return false,
+    };
+    match command {
+        MavCmd::MAV_CMD_NAV_LAND | MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => true,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => first == 0.0,
+        _ => false,
+    }
+}
+
 /// Who commands.
 #[derive(Debug, Default)]
 pub(super) struct Crew {
     lease: Lease,
     /// Systems and components, who uses them, and when they were last heard.
     numbers: HashMap<[u8; 2], (Client, Instant)>,
+    is_armed: bool,
 }
 
 impl Crew {
@@ -59,20 +74,41 @@ impl Crew {
         Ok(Some(()))
     }
 
+    /// Who commands, as far as it is known here: a page and its number, or in words. Empty when none
+    /// does.
+    pub fn commander(&self, now: Instant) -> (String, Option<u64>) {
+        match self.lease.holder(now) {
+            Some(seat @ Seat::Page(number)) => (seat.to_string(), Some(number.into())),
+            // No page had the lease: if the vehicle is led, it is led by a program.
+            _ if self.lease.is_holders(Seat::Console) => ("another program".to_owned(), None),
+            _ => (String::new(), None),
+        }
+    }
+
     /// This page is gone.
     pub fn leave(&mut self, page: u64) {
         self.lease.leave(|seat| seat == Seat::Page(page as u32));
     }
 
-    /// The vehicle stands with its motors off.
-    pub fn release(&mut self) {
-        self.lease.release();
+    /// May the vehicle's motors turn? With motors off there is nothing to hold.
+    pub fn see(&mut self, is_armed: bool) {
+        self.is_armed = is_armed;
+        if !is_armed {
+            self.lease.release();
+        }
+    }
+
+    /// Does a frame with this number ask for something that the vehicle must not do late?
+    pub fn is_order(id: u32) -> bool {
+        id != HEARTBEAT_DATA::ID && !READS.contains(&id)
     }
 
     /// May this frame of a program go to the vehicle?
     pub fn may(&mut self, now: Instant, program: Client, numbers: [u8; 2], id: u32) -> bool {
         let (owner, heard) = self.numbers.entry(numbers).or_insert((program, now));
-        if *owner != program && now.since(*heard) >= FREE {
+        // To the vehicle the next one is the same: a sign of life would keep in the air what its
+        // commander has left, so that in flight only an order takes over.
+        if *owner != program && now.since(*heard) >= FREE && (!self.is_armed || Self::is_order(id)) {
             *owner = program;
         }
         if *owner == program {
@@ -92,21 +128,28 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_of_one_connection_until_the_vehicle_has_noticed_that_it_is_gone() {
-        let (mut crew, ids) = (Crew::default(), [255, 190]);
-        let at = |ms| Instant::from_millis(ms);
-        let mut beat = |ms, number| crew.may(at(ms), program(number), ids, HEARTBEAT_DATA::ID);
-        for ms in (0..5_000).step_by(1_000) {
-            assert!(beat(ms, 1) && !beat(ms + 500, 2));
+    fn numbers_are_of_one_connection_until_it_is_gone_and_in_flight_until_another_commands() {
+        let ids = [255, 190];
+        let (beats, orders) = (HEARTBEAT_DATA::ID, COMMAND_LONG_DATA::ID);
+        for is_armed in [false, true] {
+            let mut crew = Crew::default();
+            crew.see(is_armed);
+            let mut may = |ms, number, id| crew.may(Instant::from_millis(ms), program(number), ids, id);
+            for ms in (0..5_000).step_by(1_000) {
+                assert!(may(ms, 1, beats) && !may(ms + 500, 2, beats) && !may(ms + 501, 2, orders));
+            }
+            // It is gone. The other chatters on, and is not heard before the vehicle's own patience
+            // is over; in flight not at all.
+            for ms in (5_000..8_000).step_by(500) {
+                assert!(!may(ms, 2, beats) && !may(ms, 2, orders), "{ms} ms");
+            }
+            for ms in (8_000..20_000).step_by(500) {
+                assert_eq!(may(ms, 2, beats), !is_armed, "{ms} ms");
+            }
+            assert!(may(20_000, 2, orders) && may(20_100, 2, beats) && !may(20_100, 1, beats));
+            assert!(may(20_200, 1, PARAM_REQUEST_READ_DATA::ID));
+            assert!(crew.may(Instant::from_millis(20_200), program(1), [254, 190], beats));
         }
-        // It is gone. The other chatters on, and is not heard before the vehicle's own patience is
-        // over.
-        for ms in (5_000..8_000).step_by(500) {
-            assert!(!beat(ms, 2), "{ms} ms");
-        }
-        assert!(beat(8_000, 2) && !beat(8_100, 1));
-        assert!(crew.may(at(8_200), program(1), ids, PARAM_REQUEST_READ_DATA::ID));
-        assert!(crew.may(at(8_200), program(1), [254, 190], HEARTBEAT_DATA::ID));
     }
 
     #[test]
@@ -131,7 +174,7 @@ mod tests {
             assert_eq!(crew.ask(at(20), 2, &Ask::Guided(stops)), Ok(Some(())));
         }
         assert_eq!(crew.ask(at(20), 2, &sticks), Ok(Some(())), "it has taken over");
-        crew.release();
+        crew.see(false);
         assert_eq!(crew.ask(at(21), 3, &arm), Ok(Some(())));
     }
 }

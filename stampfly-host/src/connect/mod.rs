@@ -31,24 +31,29 @@ pub use sealed::{RadioPlace, RadioPlaceError};
 
 use crate::ground;
 use crate::serve::OpenPorts;
-use crew::Crew;
+use crew::{Crew, ends_a_flight};
 use log::Log;
 use record::Record;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
-use stampfly_ground::ask::Ask;
-use stampfly_ground::{Event, Hub, Watch};
-use stampfly_link::mavlink::MavlinkDecoder;
-use stampfly_link::mavlink::dialects::common::MavMessage;
+use stampfly_ground::ask::{Ask, Asked};
+use stampfly_ground::{Client as PageClient, Event, Hub, Watch};
+use stampfly_link::mavlink::dialects::common::{
+    COMMAND_ACK_DATA, HEARTBEAT_DATA, MavMessage, MavResult, STATUSTEXT_DATA,
+};
+use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersion, MavlinkWriter, MessageData as _};
 use stampfly_link::secure::Key;
+use stampfly_services::mavlink::Pulse;
+use stampfly_services::{Asked as Done, Seat, Told};
 use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
 use stampfly_types::Message as _;
-use stampfly_types::messages::FlightStatus;
+use stampfly_types::messages::{FlightStatus, GuidedCommand};
 use station::{Said, Station};
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
+use translation::VEHICLE;
 use way::{Open, Way};
 
 /// Where other programs find the vehicle.
@@ -64,6 +69,10 @@ const ONLY: usize = 0;
 const AGAIN: Duration = Duration::from_millis(500);
 /// A vehicle that says nothing for this long is not there.
 const SILENCE: Duration = Duration::from_secs(2);
+/// What a program has said behind a network that held it up may be as old as this.
+const HELD: Duration = Duration::from_secs(10);
+/// Why an ask does not go to the vehicle.
+const NOT_HEARD: &str = "nothing is heard of the vehicle: it was not sent";
 /// How often it is looked what pages show.
 const LOOK: Duration = Duration::from_millis(200);
 /// What pages do not show any more is sent for so long still: they draw in bursts.
@@ -86,13 +95,22 @@ enum State {
     Up,
 }
 
+/// A program at MAVLink's ports.
+#[derive(Default)]
+struct Program {
+    /// The frame that it is in the middle of.
+    decoder: MavlinkDecoder<MavMessage>,
+    /// Whether what it says was held up on its way here.
+    pulse: Pulse,
+}
+
 /// What is made of what the vehicle says.
 struct Ends<V: Vehicle> {
     hub: Arc<Hub>,
     watch: Watch,
     ports: Arc<OpenPorts>,
-    /// Who is connected at MAVLink's ports, and the frame each is in the middle of.
-    programs: HashMap<Client, MavlinkDecoder<MavMessage>>,
+    /// Who is connected at MAVLink's ports.
+    programs: HashMap<Client, Program>,
     /// As the vehicle says, as far as it has.
     settings: Vec<Setting>,
     known: Vec<bool>,
@@ -100,6 +118,10 @@ struct Ends<V: Vehicle> {
     log: Option<Log<V>>,
     logs: usize,
     crew: Crew,
+    /// Answers programs that another keeps out.
+    answers: MavlinkWriter,
+    /// Who commands, as pages were told last.
+    commander: Option<(String, Option<u64>)>,
     /// The place of `flight_status` among the topics.
     status: Option<usize>,
     /// The flight record, if it is wanted.
@@ -150,7 +172,12 @@ impl<V: Vehicle> Ends<V> {
             }
             Said::Parameter(index, value) => self.parameter(index, value),
             Said::Chunk(chunk) => self.chunk(chunk),
-            Said::Frame(frame) => self.programs.keys().for_each(|client| self.ports.send(client, frame)),
+            Said::Frame(frame) => {
+                self.programs.keys().for_each(|client| self.ports.send(client, frame.bytes()));
+                if let Some(text) = told(frame) {
+                    self.hub.tell_all(ONLY, &Event::Text { text });
+                }
+            }
             Said::Text(text) => self.hub.tell_all(ONLY, &Event::Text { text }),
             Said::Foreign => {
                 let text =
@@ -181,8 +208,10 @@ impl<V: Vehicle> Ends<V> {
         self.clock = self.clock.max(at);
         self.watch.note(topic, at, words);
         let status = || words.try_into().ok().and_then(FlightStatus::from_words);
-        if Some(topic) == self.status && status().is_some_and(|status| !status.armed) {
-            self.crew.release();
+        if Some(topic) == self.status
+            && let Some(FlightStatus { armed, .. }) = status()
+        {
+            self.crew.see(armed);
         }
         if let Some(log) = &mut self.log {
             log.note(topic, at, words);
@@ -209,24 +238,99 @@ impl<V: Vehicle> Ends<V> {
         }
     }
 
-    /// What programs say in MAVLink, frame by frame, so that none lies within another.
-    fn programs(&mut self, now: stampfly_types::Instant, put: &mut Vec<u8>) {
-        let Self { ports, programs, crew, .. } = self;
+    /// What programs say in MAVLink, frame by frame, so that none lies within another. An order goes
+    /// with the time at which it was said, as far as this end knows.
+    fn programs(&mut self, now: stampfly_types::Instant, station: &mut Station, put: &mut Vec<u8>) {
+        let Self { ports, programs, crew, answers, .. } = self;
         ports.receive(None, &mut |client, heard| match heard {
-            Heard::Opened => drop(programs.insert(client, MavlinkDecoder::new())),
+            Heard::Opened => {
+                let mut program = Program::default();
+                program.pulse.hear(now, false);
+                programs.insert(client, program);
+            }
             Heard::Closed => drop(programs.remove(&client)),
             Heard::Bytes(bytes) => {
-                let decoder = programs.entry(client).or_default();
+                let Program { decoder, pulse } = programs.entry(client).or_default();
                 for byte in bytes {
-                    if let Some(frame) = decoder.feed(*byte)
-                        && crew.may(now, client, [frame.system, frame.component], frame.id)
-                    {
-                        put.extend(frame.bytes());
+                    let Some(frame) = decoder.feed(*byte) else { continue };
+                    pulse.hear(now, frame.id == HEARTBEAT_DATA::ID);
+                    let numbers = [frame.system, frame.component];
+                    let order = Crew::is_order(frame.id).then(|| frame.message().ok()).flatten();
+                    let ends = order.as_ref().is_some_and(ends_a_flight);
+                    if !crew.may(now, client, numbers, frame.id) && !ends {
+                        let mut room = [0; LONGEST];
+                        let answer = order.and_then(|order| refusal(&order, numbers));
+                        let answer = answer.and_then(|ack| answers.write(MavlinkVersion::V2, &ack, &mut room));
+                        answer.into_iter().for_each(|answer| ports.send(&client, answer));
+                        continue;
                     }
+                    if Crew::is_order(frame.id) && !ends {
+                        if !station.knows_time() {
+                            continue;
+                        }
+                        let said = Instant::now();
+                        let said = if pulse.is_held() { said.checked_sub(HELD) } else { Some(said) };
+                        station.mark(said, put);
+                    }
+                    put.extend(frame.bytes());
                 }
             }
         });
     }
+
+    /// Tells pages who commands, when that has changed.
+    fn tell_commander(&mut self, now: stampfly_types::Instant) {
+        let commander = self.crew.commander(now);
+        if self.commander.as_ref() != Some(&commander) {
+            let (who, page) = commander.clone();
+            self.commander = Some(commander);
+            self.hub.tell_all(ONLY, &Event::Commander { who, page });
+        }
+    }
+
+    /// May this ask of a page go to the vehicle? Whom it is answered otherwise, is told.
+    fn passes(&mut self, now: stampfly_types::Instant, is_heard: bool, client: PageClient, asked: &Asked) -> bool {
+        let why = match self.crew.ask(now, client.number(), &asked.ask) {
+            _ if !is_heard && !asked.ask.is_never_late() => NOT_HEARD.to_owned(),
+            Ok(Some(())) => {
+                if let Ask::Guided(guided) = asked.ask {
+                    let what = Done::Command(GuidedCommand::from(guided).kind);
+                    let text = Told { seat: Seat::Page(client.number() as u32), what }.to_string();
+                    self.hub.tell_all(ONLY, &Event::Text { text });
+                }
+                return true;
+            }
+            Ok(None) => return false,
+            Err(refusal) => refusal.to_string(),
+        };
+        self.take(Said::Answer(client, asked.clone(), Err(why)));
+        false
+    }
+}
+
+/// The answer to a command of a program of these numbers, with which another speaks.
+fn refusal(order: &MavMessage, [target_system, target_component]: [u8; 2]) -> Option<MavMessage> {
+    let command = match order {
+        MavMessage::COMMAND_LONG(data) => data.command,
+        MavMessage::COMMAND_INT(data) => data.command,
+        _ => return None,
+    };
+    let result = MavResult::MAV_RESULT_NOT_IN_CONTROL;
+    let answer = COMMAND_ACK_DATA { command, result, target_system, target_component, ..COMMAND_ACK_DATA::default() };
+    Some(MavMessage::COMMAND_ACK(answer))
+}
+
+/// What the vehicle says of what others have asked it, at this line and elsewhere. Of this station it
+/// is known here.
+fn told(frame: &MavlinkFrame<'_>) -> Option<String> {
+    if frame.id != STATUSTEXT_DATA::ID {
+        return None;
+    }
+    let Ok(MavMessage::STATUSTEXT(said)) = frame.message::<MavMessage>() else { return None };
+    let text = said.text.to_str().ok()?;
+    let ours = format!("MAVLink {}/", station::SYSTEM);
+    let is_told = ["MAVLink ", "page ", "a Tello program", "the console:", "the station with"];
+    (!text.starts_with(&ours) && is_told.iter().any(|begin| text.starts_with(begin))).then(|| text.to_owned())
 }
 
 impl<V: Vehicle> Bridge<V> {
@@ -265,6 +369,8 @@ impl<V: Vehicle> Bridge<V> {
             log: None,
             logs: 0,
             crew: Crew::default(),
+            answers: MavlinkWriter::new(VEHICLE[0], VEHICLE[1]),
+            commander: None,
             status: topics::<V>().iter().position(|topic| topic.name == "flight_status"),
             record: None,
             clock: stampfly_types::Instant::ZERO,
@@ -323,7 +429,8 @@ impl<V: Vehicle> Bridge<V> {
             for (client, asked) in self.ends.hub.asks(ONLY, ground::now()) {
                 self.ends.take(Said::Answer(client, asked, Err("the line to the vehicle is gone".into())));
             }
-            self.ends.programs(self.now(), &mut Vec::new());
+            let now = self.now();
+            self.ends.programs(now, &mut self.station, &mut Vec::new());
             thread::sleep(place::LOOK);
         }
     }
@@ -344,26 +451,26 @@ impl<V: Vehicle> Bridge<V> {
             let Self { station, ends, shown, begun, .. } = self;
             station.hear(now, part.get(..length).unwrap_or_default(), &mut |said| ends.take(said));
             let passed = stampfly_types::Instant::from_micros(begun.elapsed().as_micros() as u64);
-            for (client, asked) in ends.hub.asks(ONLY, ground::now()) {
-                match ends.crew.ask(passed, client.number(), &asked.ask) {
-                    Ok(Some(())) => {}
-                    Ok(None) => continue,
-                    Err(refusal) => {
-                        ends.take(Said::Answer(client, asked, Err(refusal.to_string())));
-                        continue;
-                    }
+            let is_heard = is_up(station, now) && station.knows_time();
+            let wall = ground::now();
+            for (client, asked) in ends.hub.asks(ONLY, wall) {
+                if !ends.passes(passed, is_heard, client, &asked) {
+                    continue;
                 }
                 // It may have changed them.
                 if matches!(&asked.ask, Ask::Console { line } if line.starts_with("param") || line.starts_with("autotune"))
                 {
                     ends.restarted = true;
                 }
-                station.ask(now, client, asked, &mut put, &mut |said| ends.take(said));
+                let age = asked.at.map_or(Duration::ZERO, |at| wall.saturating_sub(Duration::from_secs_f64(at / 1e3)));
+                let since = now.checked_sub(age).unwrap_or(now);
+                station.ask((now, since), client, asked, &mut put, &mut |said| ends.take(said));
             }
             for page in ends.hub.gone(ONLY) {
                 ends.crew.leave(page.number());
             }
-            ends.programs(passed, &mut put);
+            ends.tell_commander(passed);
+            ends.programs(passed, station, &mut put);
             if now.duration_since(looked) >= LOOK {
                 looked = now;
                 let again = now.duration_since(told) >= TOLD;
@@ -375,7 +482,7 @@ impl<V: Vehicle> Bridge<V> {
                     _ = record.flush();
                 }
             }
-            let is_up = station.heard().is_some_and(|heard| now.duration_since(heard) < SILENCE);
+            let is_up = is_up(station, now);
             if core::mem::take(&mut ends.restarted) || (is_up && self.state != State::Up) {
                 station.list();
             }
@@ -398,6 +505,11 @@ impl<V: Vehicle> Bridge<V> {
         }
         None
     }
+}
+
+/// Is the vehicle heard?
+fn is_up(station: &Station, now: Instant) -> bool {
+    station.heard().is_some_and(|heard| now.duration_since(heard) < SILENCE)
 }
 
 /// Tells the vehicle what to send: what pages show, and what every page shows of this vehicle.

@@ -20,11 +20,17 @@ pub(super) struct Orders {
 }
 
 impl Orders {
-    /// Takes a command. `false` when there is no room.
-    pub fn say(&mut self, now: Instant, number: u32, question: u16, command: GuidedCommand) -> bool {
+    /// Takes a command that was asked for then. `false` when there is no room.
+    pub fn say(
+        &mut self,
+        now: Instant,
+        asked: Instant,
+        (number, question): (u32, u16),
+        command: GuidedCommand,
+    ) -> bool {
         // Before anything is said: what is over takes its room.
         self.forget(now);
-        if !self.commands.say(now, number, command) {
+        if !self.commands.say_since(now, asked, number, command) {
             return false;
         }
         if command.kind == GuidedKind::Kill

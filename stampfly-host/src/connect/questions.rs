@@ -15,6 +15,10 @@ const AGAIN: Duration = Duration::from_millis(300);
 const GAP: Duration = Duration::from_millis(60);
 /// For this long. A station that gives up after three seconds has given up on none that may still be answered.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// What changes something is not asked any more when it is older.
+const FRESH: Duration = Duration::from_secs(1);
+/// And is asked again after this long.
+const CHANGE_AGAIN: Duration = Duration::from_millis(150);
 
 /// Seals a payload and sends it. Returns the counter of its frame; `None` when it could not be sealed.
 pub(super) type Send<'s> = &'s mut dyn FnMut(&Payload<'_>) -> Option<u32>;
@@ -26,6 +30,8 @@ struct Parameter {
     index: u16,
     /// What it is to be, if it is to be changed.
     written: Option<f32>,
+    /// From when on it is not said any more, and from when on no answer is awaited.
+    said_until: Instant,
     until: Instant,
     again_at: Instant,
 }
@@ -55,6 +61,10 @@ struct Line {
     text: String,
     /// Bytes of the answer that have come.
     had: u16,
+    /// Has the vehicle begun with it?
+    is_begun: bool,
+    /// From when on it is not said any more, unless the vehicle has begun.
+    said_until: Instant,
     until: Instant,
     again_at: Instant,
 }
@@ -69,24 +79,25 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// Takes a question, which a line's vehicle knows by another number. `false` when it is none of these.
-    pub fn ask(&mut self, now: Instant, number: u16, of_line: u32, payload: &Payload<'_>) -> bool {
-        let (until, again_at) = (now + PATIENCE, now);
+    /// Takes a question that was asked then, and which a line's vehicle knows by another number. `false` when it is none of these.
+    pub fn ask(&mut self, now: Instant, asked: Instant, (number, of_line): (u16, u32), payload: &Payload<'_>) -> bool {
+        let (said_until, until, again_at) = (asked + FRESH, now + PATIENCE, now);
         match *payload {
             Payload::ReadParameter { index } => {
-                let question = Parameter { number, index, written: None, until, again_at };
+                let question = Parameter { number, index, written: None, said_until: until, until, again_at };
                 remember(&mut self.parameters, question);
             }
             Payload::WriteParameter { index, value } => {
                 // The newer value is the one that stays: the older is not said again.
                 let is_older = |question: &&mut Parameter| question.index == index && question.written.is_some();
                 self.parameters.iter_mut().filter(is_older).for_each(|older| older.again_at = older.until);
-                let question = Parameter { number, index, written: Some(value), until, again_at };
+                let question = Parameter { number, index, written: Some(value), said_until, until, again_at };
                 remember(&mut self.parameters, question);
             }
             Payload::Line(text) => {
                 let text = text.to_owned();
-                self.line = Some(Line { question: number, number: of_line, text, had: 0, until, again_at });
+                let (question, number) = (number, of_line);
+                self.line = Some(Line { question, number, text, had: 0, is_begun: false, said_until, until, again_at });
             }
             _ => return false,
         }
@@ -97,16 +108,18 @@ impl Questions {
     pub fn poll(&mut self, now: Instant, send: Send<'_>) {
         let Self { parameters, line, refusable } = self;
         parameters.retain(|question| now < question.until);
-        for question in parameters.iter_mut().filter(|question| now >= question.again_at) {
-            question.again_at = now + AGAIN;
+        for question in parameters.iter_mut().filter(|question| (question.again_at..question.said_until).contains(&now))
+        {
+            question.again_at = now + if question.written.is_some() { CHANGE_AGAIN } else { AGAIN };
             let counter = send(&question.payload());
             if let Some(counter) = counter.filter(|_| question.written.is_some()) {
                 remember(refusable, (counter, question.number));
             }
         }
         line.take_if(|line| now >= line.until);
-        if let Some(line) = line.as_mut().filter(|line| now >= line.again_at) {
-            line.again_at = now + AGAIN;
+        let is_due = |line: &&mut Line| now >= line.again_at && (line.is_begun || now < line.said_until);
+        if let Some(line) = line.as_mut().filter(is_due) {
+            line.again_at = now + if line.is_begun { AGAIN } else { CHANGE_AGAIN };
             let question = Payload::Question { number: line.number, from: line.had, line: &line.text };
             if let Some(counter) = send(&question) {
                 remember(refusable, (counter, line.question));
@@ -124,6 +137,12 @@ impl Questions {
     /// The number of the question that the next part of an answer belongs to. Behind a gap it is none, and is asked for once more.
     pub fn part(&mut self, now: Instant, number: u32, from: u16, text: &str, last: bool) -> Option<u16> {
         let line = self.line.as_mut().filter(|line| line.number == number)?;
+        let begins = !core::mem::replace(&mut line.is_begun, true);
+        // That the vehicle works on it is no progress, but for the first time: it is not waited for
+        // without end.
+        if begins || (from == line.had && !text.is_empty()) {
+            line.until = now + PATIENCE;
+        }
         if from != line.had {
             if from > line.had {
                 line.again_at = line.again_at.min(now + GAP);
@@ -131,10 +150,6 @@ impl Questions {
             return None;
         }
         let question = line.question;
-        // That somebody works on it is no progress: he is not waited for without end.
-        if !text.is_empty() {
-            line.until = now + PATIENCE;
-        }
         line.again_at = now + AGAIN;
         match u16::try_from(text.len()).ok().and_then(|length| from.checked_add(length)) {
             Some(had) if !last => line.had = had,

@@ -3,12 +3,13 @@
 //! The vehicle's end is `stampfly-services`' [`Cable`](stampfly_services::cable::Cable). Every question has a number, and is answered once, by the vehicle or,
 //! when that takes too long, here.
 
+use super::translation::is_newer;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_ground::Client;
 use stampfly_ground::ask::{Ask, Asked, Guided, Reply};
 use stampfly_link::mavlink::dialects::common::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
-use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter, Tunnel};
+use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersion, MavlinkWriter, Tunnel};
 use stampfly_link::secure::Payload;
 use stampfly_services::cable::{Assembly, Envelope, Part, Split, TYPE, fingerprint};
 use stampfly_services::desk;
@@ -18,7 +19,7 @@ use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
 /// Its system in MAVLink: not that of QGroundControl (255), whose commands are another's.
-const SYSTEM: u8 = 245;
+pub(super) const SYSTEM: u8 = 245;
 /// `MAV_COMP_ID_MISSIONPLANNER`, what ground stations call themselves.
 const COMPONENT: u8 = 190;
 /// What is not answered by then will not be: the longest answer of the console comes in a second, and begins at once.
@@ -27,6 +28,10 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const AHEAD: usize = 6;
 /// Lines of the console that wait for the one before.
 const LINES: usize = 16;
+/// A topic that no vehicle has: to end watching it does nothing.
+const NO_TOPIC: u16 = u16::MAX;
+/// What was asked within this time of something before it needs no time of its own.
+const NEAR: Duration = Duration::from_millis(50);
 /// Characters of a line of text from the vehicle.
 const LONGEST_TEXT: usize = 500;
 
@@ -42,7 +47,7 @@ pub enum Said<'s> {
     /// A chunk of the flight record.
     Chunk(&'s [u8]),
     /// A whole frame of MAVLink, for other programs.
-    Frame(&'s [u8]),
+    Frame(&'s MavlinkFrame<'s>),
     /// A line of text that nobody asked for.
     Text(String),
     /// The vehicle's tables are others: its firmware is not of this program's version.
@@ -99,7 +104,8 @@ pub struct Station {
     number: u16,
     waiting: HashMap<u16, (Why, Instant)>,
     line: Option<(Typed, Instant)>,
-    lines: VecDeque<(Client, Asked, String)>,
+    /// With when each was asked.
+    lines: VecDeque<(Client, Asked, String, Instant)>,
     motor: VecDeque<(Client, Asked, Instant)>,
     /// The next parameter of the list.
     next: usize,
@@ -110,7 +116,8 @@ pub struct Station {
     heard: Option<Instant>,
     /// The vehicle's clock, ms, in its newest sample, and when that came. With it the station says when it asks something.
     clock: Option<(u32, Instant)>,
-    now: Instant,
+    /// When what was said last with a time was asked.
+    dated: Option<Instant>,
 }
 
 impl Station {
@@ -137,7 +144,7 @@ impl Station {
             words: Vec::new(),
             heard: None,
             clock: None,
-            now,
+            dated: None,
         }
     }
 
@@ -156,14 +163,13 @@ impl Station {
     pub fn lost(&mut self, tell: Tell<'_>) {
         self.expire(None, tell);
         (self.split, self.decoder, self.assembly) = (Split::new(), MavlinkDecoder::new(), Assembly::default());
-        (self.heard, self.clock, self.is_foreign) = (None, None, false);
+        (self.heard, self.clock, self.dated, self.is_foreign) = (None, None, None, false);
         self.next = self.settings.len();
         self.text.clear();
     }
 
     /// Takes what has come.
     pub fn hear(&mut self, now: Instant, bytes: &[u8], tell: Tell<'_>) {
-        self.now = now;
         let clock = stampfly_types::Instant::from_micros(now.duration_since(self.begun).as_micros() as u64);
         for byte in bytes {
             match self.split.feed(clock, *byte) {
@@ -194,7 +200,7 @@ impl Station {
         let Some(frame) = self.decoder.feed(byte) else { return };
         self.heard = Some(now);
         if frame.id != Tunnel::ID {
-            tell(Said::Frame(frame.bytes()));
+            tell(Said::Frame(&frame));
             if let Ok(MavMessage::COMMAND_ACK(ack)) = frame.message::<MavMessage>()
                 && ack.command == MavCmd::MAV_CMD_DO_MOTOR_TEST
                 // Zero is everybody.
@@ -222,11 +228,7 @@ impl Station {
         match payload {
             Payload::Sample(sample) => {
                 let at = (sample.at.as_micros() / 1_000) as u32;
-                // A vehicle that has started anew has another clock.
-                let is_newest = |(before, _): (u32, Instant)| {
-                    (at.wrapping_sub(before) as i32) >= 0 || before.wrapping_sub(at) > 500
-                };
-                if self.clock.is_none_or(is_newest) {
+                if self.clock.is_none_or(|(before, _)| is_newer(at, before)) {
                     self.clock = Some((at, now));
                 }
                 self.words.clear();
@@ -283,24 +285,37 @@ impl Station {
         }
     }
 
-    /// Asks the vehicle what a page has asked for. Answers at once what no vehicle needs to be asked.
-    pub fn ask(&mut self, now: Instant, client: Client, asked: Asked, put: &mut Vec<u8>, tell: Tell<'_>) {
-        self.now = now;
+    /// Can it say when something was asked? Not before the vehicle has told its time: what is held
+    /// up on the line would be done whenever it comes.
+    #[must_use]
+    pub const fn knows_time(&self) -> bool {
+        self.clock.is_some()
+    }
+
+    /// Asks the vehicle what a page has asked for at this time. Answers at once what no vehicle needs to be asked.
+    pub fn ask(
+        &mut self,
+        (now, since): (Instant, Instant),
+        client: Client,
+        asked: Asked,
+        put: &mut Vec<u8>,
+        tell: Tell<'_>,
+    ) {
         let guided = |kind| Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() });
         let (payload, asked) = match asked.ask.clone() {
             Ask::Guided(Guided::Kill {}) => (Payload::Kill, asked),
             // A click on the map says where to be, not where to be after everything else.
             Ask::Guided(go_to @ Guided::GoTo { .. }) => {
-                _ = self.say(&guided(GuidedKind::Hold), put);
+                _ = self.say(since, &guided(GuidedKind::Hold), put);
                 (Payload::Guided(go_to.into()), asked)
             }
             Ask::Guided(other) => (Payload::Guided(other.into()), asked),
             Ask::Sticks(sticks) => {
-                _ = self.say(&Payload::Sticks(sticks.into()), put);
+                _ = self.say(since, &Payload::Sticks(sticks.into()), put);
                 return;
             }
             Ask::Alive {} => {
-                _ = self.say(&guided(GuidedKind::None), put);
+                _ = self.say(since, &guided(GuidedKind::None), put);
                 return;
             }
             Ask::ParamGet { name } | Ask::ParamSet { name, .. } => {
@@ -313,31 +328,39 @@ impl Station {
                     _ => (Payload::ReadParameter { index }, asked),
                 }
             }
-            Ask::ParamSave {} => return self.queue(client, asked, "param save".into(), tell),
-            Ask::Console { line } => return self.queue(client, asked, line, tell),
-            Ask::MotorTest { motor, duty } => return self.turn(now, client, asked, (motor, duty), put),
-            Ask::MotorStop {} => return self.turn(now, client, asked, (0, 0.0), put),
+            Ask::ParamSave {} => return self.queue(since, client, asked, "param save".into(), tell),
+            Ask::Console { line } => return self.queue(since, client, asked, line, tell),
+            Ask::MotorTest { motor, duty } => return self.turn((now, Some(since)), client, asked, (motor, duty), put),
+            Ask::MotorStop {} => return self.turn((now, None), client, asked, (0, 0.0), put),
             _ => return tell(Said::Answer(client, asked, Err("this vehicle does not do that".into()))),
         };
-        match self.say(&payload, put) {
+        match self.say(since, &payload, put) {
             Some(number) => drop(self.waiting.insert(number, (Why::Page(client, asked), now))),
             None => tell(Said::Answer(client, asked, Err("a number is out of range".into()))),
         }
     }
 
     /// A line that is typed when those before are answered.
-    fn queue(&mut self, client: Client, asked: Asked, line: String, tell: Tell<'_>) {
+    fn queue(&mut self, since: Instant, client: Client, asked: Asked, line: String, tell: Tell<'_>) {
         if line.len() > desk::LINE {
             tell(Said::Answer(client, asked, Err(format!("longer than {} characters", desk::LINE))));
         } else if self.lines.len() >= LINES {
             tell(Said::Answer(client, asked, Err("one line after the other".into())));
         } else {
-            self.lines.push_back((client, asked, line));
+            self.lines.push_back((client, asked, line, since));
         }
     }
 
-    /// One motor, in MAVLink's own words: they wait for no line.
-    fn turn(&mut self, now: Instant, client: Client, asked: Asked, (motor, duty): (u8, f32), put: &mut Vec<u8>) {
+    /// One motor, in MAVLink's own words: they wait for no line. What stops it is right at any time, and has none.
+    fn turn(
+        &mut self,
+        (now, since): (Instant, Option<Instant>),
+        client: Client,
+        asked: Asked,
+        (motor, duty): (u8, f32),
+        put: &mut Vec<u8>,
+    ) {
+        self.mark(since, put);
         let data = COMMAND_LONG_DATA {
             param1: motor.into(),
             param3: 100.0 * duty,
@@ -356,22 +379,30 @@ impl Station {
     /// Wants to see a topic every `period` ms; zero for not any more.
     pub fn watch(&mut self, topic: usize, period: u16, put: &mut Vec<u8>) {
         if let Ok(topic) = u16::try_from(topic) {
-            _ = self.say(&Payload::Watch { topic, period }, put);
+            _ = self.say_at(None, &Payload::Watch { topic, period }, put);
+        }
+    }
+
+    /// Says when what follows in MAVLink's own words was asked, which have no room for a time; the
+    /// vehicle does nothing that was held up. Without a time it does what follows whenever it comes.
+    pub fn mark(&mut self, since: Option<Instant>, put: &mut Vec<u8>) {
+        let is_near = |dated: Instant| since.is_some_and(|at| at >= dated && at.duration_since(dated) < NEAR);
+        if !self.dated.is_some_and(is_near) {
+            _ = self.say_at(since, &Payload::Watch { topic: NO_TOPIC, period: 0 }, put);
         }
     }
 
     /// Wants the flight record. The vehicle is to be told so again and again.
     pub fn record(&mut self, put: &mut Vec<u8>) {
-        _ = self.say(&Payload::Record { wanted: true }, put);
+        _ = self.say_at(None, &Payload::Record { wanted: true }, put);
     }
 
     /// What is due: the next line, parameters of the list, an end to patience.
     pub fn poll(&mut self, now: Instant, put: &mut Vec<u8>, tell: Tell<'_>) {
-        self.now = now;
         if self.line.is_none()
-            && let Some((client, asked, line)) = self.lines.pop_front()
+            && let Some((client, asked, line, since)) = self.lines.pop_front()
         {
-            match self.say(&Payload::Line(&line), put) {
+            match self.say(since, &Payload::Line(&line), put) {
                 Some(number) => self.line = Some((Typed { number, client, asked, answer: String::new() }, now)),
                 None => tell(Said::Answer(client, asked, Err("that cannot be typed".into()))),
             }
@@ -380,7 +411,7 @@ impl Station {
         while self.next < self.settings.len() && self.waiting.values().filter(|why| listed(why)).count() < AHEAD {
             let index = self.next;
             self.next += 1;
-            if let Some(number) = self.say(&Payload::ReadParameter { index: index as u16 }, put) {
+            if let Some(number) = self.say_at(None, &Payload::ReadParameter { index: index as u16 }, put) {
                 self.waiting.insert(number, (Why::List(index), now));
             }
         }
@@ -415,16 +446,25 @@ impl Station {
             }
         }
         if now.is_none() {
-            for (client, asked, _) in self.lines.drain(..) {
+            for (client, asked, ..) in self.lines.drain(..) {
                 tell(Said::Answer(client, asked, Err("the line to the vehicle is gone".into())));
             }
         }
     }
 
-    /// Puts a payload into frames. Returns its number; `None` when a value in it must not be used.
-    fn say(&mut self, payload: &Payload<'_>, put: &mut Vec<u8>) -> Option<u16> {
+    /// Puts a payload that was asked for then into frames. Returns its number; `None` when a value in it must not be used.
+    fn say(&mut self, since: Instant, payload: &Payload<'_>, put: &mut Vec<u8>) -> Option<u16> {
+        self.say_at(Some(since), payload, put)
+    }
+
+    /// The same. Without a time the vehicle does it whenever it comes.
+    fn say_at(&mut self, since: Option<Instant>, payload: &Payload<'_>, put: &mut Vec<u8>) -> Option<u16> {
         self.number = self.number.wrapping_add(1);
-        let said = self.clock.map(|(at, heard)| at.wrapping_add(self.now.duration_since(heard).as_millis() as u32));
+        let said = self.clock.zip(since).map(|((at, heard), since)| {
+            let [after, before] = [since.duration_since(heard), heard.duration_since(since)];
+            at.wrapping_add(after.as_millis() as u32).wrapping_sub(before.as_millis() as u32)
+        });
+        self.dated = since.filter(|_| said.is_some());
         let Self { table, number, writer, .. } = self;
         let sound = Envelope::write(*table, *number, said, payload, &mut |part| {
             let Some(tunnel) = Tunnel::new(TYPE, [0; 2], part) else { return };

@@ -11,12 +11,12 @@ use stampfly_link::mavlink::dialects::common::MavMessage;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkWriter, Tunnel};
 use stampfly_link::secure::Payload;
 use stampfly_services::cable::{Assembly, Envelope, TYPE};
-use stampfly_types::Instant;
 use stampfly_types::messages::GuidedKind;
+use stampfly_types::{Duration, Instant};
 use std::collections::VecDeque;
 
 /// Who the vehicle is on the station's line: system and component.
-const VEHICLE: [u8; 2] = [1, 1];
+pub(super) const VEHICLE: [u8; 2] = [1, 1];
 /// A command was not taken.
 const REFUSED: Payload<'static> = Payload::Acknowledgement { counter: 0, taken: false };
 
@@ -42,6 +42,8 @@ pub(super) struct Translation {
     counted: u32,
     orders: Orders,
     questions: Questions,
+    /// The vehicle's clock, ms, in its newest sample, and when that came: as the station knows it.
+    clock: Option<(u32, Instant)>,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
 }
@@ -58,6 +60,7 @@ impl Translation {
             counted: first,
             orders: Orders::default(),
             questions: Questions::default(),
+            clock: None,
             frames: VecDeque::new(),
         }
     }
@@ -69,7 +72,9 @@ impl Translation {
             // MAVLink's own messages are for a cable.
             let tunnel = (frame.id == Tunnel::ID).then(|| Tunnel::read(frame.payload)).flatten();
             let Some(tunnel) = tunnel.filter(|tunnel| tunnel.kind == TYPE) else { continue };
-            let Some((Envelope { table, number, .. }, payload)) = self.assembly.feed(&tunnel.bytes) else { continue };
+            let Some((Envelope { table, number, said, .. }, payload)) = self.assembly.feed(&tunnel.bytes) else {
+                continue;
+            };
             self.ours = table;
             let passes = match self.tables {
                 Tables::Ours => true,
@@ -81,12 +86,13 @@ impl Translation {
                 continue;
             }
             self.counted = self.counted.wrapping_add(1);
+            let asked = asked(now, self.clock, said);
             // What says nothing but that somebody is there comes again anyway.
             if let Some(command) = payload.command().filter(|command| command.kind != GuidedKind::None) {
-                if !self.orders.say(now, self.counted, number, command) {
+                if !self.orders.say(now, asked, (self.counted, number), command) {
                     put(&mut self.writer, &mut self.frames, table, number, &REFUSED);
                 }
-            } else if !self.questions.ask(now, number, self.counted, &payload) {
+            } else if !self.questions.ask(now, asked, (number, self.counted), &payload) {
                 if payload.is_kill() {
                     self.orders.end(now);
                 }
@@ -118,6 +124,12 @@ impl Translation {
             // It is said again.
             return;
         }
+        if let Payload::Sample(sample) = payload {
+            let at = (sample.at.as_micros() / 1_000) as u32;
+            if self.clock.is_none_or(|(before, _)| is_newer(at, before)) {
+                self.clock = Some((at, now));
+            }
+        }
         let (numbers, payload) = match *payload {
             Payload::Acknowledgement { counter, taken } => {
                 let mut numbers = self.orders.acknowledge(counter, taken);
@@ -147,6 +159,21 @@ impl Translation {
     }
 }
 
+/// Is this time of a vehicle's clock, ms, newer than that one? Samples may pass each other. A vehicle
+/// that has started anew has another clock.
+pub(super) const fn is_newer(at: u32, before: u32) -> bool {
+    (at.wrapping_sub(before) as i32) >= 0 || before.wrapping_sub(at) > 500
+}
+
+/// When something was asked that the station has said at this time of the vehicle's clock, ms. Not
+/// before the clock was known, and not in the future.
+fn asked(now: Instant, clock: Option<(u32, Instant)>, said: Option<u32>) -> Instant {
+    let Some(((at, heard), said)) = clock.zip(said) else { return now };
+    let passed = now.since(heard).as_micros() / 1_000;
+    let age = at.wrapping_add(passed as u32).wrapping_sub(said) as i32;
+    now - Duration::from_millis(age.max(0).unsigned_abs().into())
+}
+
 /// Puts an envelope into frames for the station.
 fn put(writer: &mut MavlinkWriter, frames: &mut VecDeque<u8>, table: u16, number: u16, payload: &Payload<'_>) {
     Envelope::write(table, number, None, payload, &mut |part| {
@@ -161,7 +188,6 @@ fn put(writer: &mut MavlinkWriter, frames: &mut VecDeque<u8>, table: u16, number
 mod tests {
     use super::*;
     use stampfly_link::secure::Sample;
-    use stampfly_types::Duration;
     use stampfly_types::messages::{GuidedCommand, PilotInput};
 
     const OURS: u16 = 7;

@@ -73,7 +73,9 @@ pub fn ask(socket: &mut WebSocket<TcpStream>, id: u32, mut what: Value) -> Value
         let answer = next(socket, "reply", |reply| reply["id"] == id);
         let text = answer["text"].as_str().unwrap_or_default();
         // A machine that is busy with other tests may stop a vehicle for longer than its link allows. A person asks again then.
-        let is_silent = text == "the vehicle does not answer" || text.starts_with("expired");
+        let is_silent = text == "the vehicle does not answer"
+            || text.starts_with("expired")
+            || text.starts_with("nothing is heard");
         if !is_silent || Instant::now() > until {
             return answer;
         }

@@ -16,7 +16,7 @@ use tungstenite::{Message, WebSocket};
 const SOON: Duration = Duration::from_secs(20);
 
 /// A file with a key, whose first byte is this.
-fn key(folder: &Path, name: &str, first: u8) -> String {
+pub fn key(folder: &Path, name: &str, first: u8) -> String {
     let file = folder.join(name);
     std::fs::write(&file, format!("{first:02x}{}\n", "5a".repeat(31))).expect("the folder can be written");
     #[cfg(unix)]

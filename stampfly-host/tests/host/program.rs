@@ -70,6 +70,11 @@ impl Program {
         (program, place)
     }
 
+    /// Where this port is.
+    pub fn place(&mut self, port: &str) -> String {
+        self.said(port, "listening on ")
+    }
+
     /// What it says behind this word, to the next white space.
     pub fn said(&mut self, line: &str, word: &str) -> String {
         // A byte at a time: what is read ahead is lost for whoever asks next.

@@ -11,7 +11,10 @@ use stampfly_types::{Duration, Instant};
 
 /// Commands that wait, besides a kill.
 const WAITING: usize = 4;
-/// After this long nobody expects a command to be obeyed any more.
+/// A command that is older is not said any more: who asked for it has seen by then that nothing
+/// happened.
+const FRESH: Duration = Duration::from_secs(1);
+/// A kill and a landing are right at any time, and are said for longer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two frames of a command. An acknowledgement takes a turn of the vehicle's, 20 ms, and twice the way.
 const AGAIN: Duration = Duration::from_millis(60);
@@ -48,7 +51,7 @@ impl Said {
 /// assert_eq!(commands.next(later), Some(arm), "nothing was heard of it");
 /// assert!(commands.acknowledge(41, true));
 /// assert!(matches!(commands.next(later), Some(Payload::Numbered { number: 42, .. })));
-/// assert_eq!(commands.over(now + Duration::from_secs(2)), Some(42));
+/// assert_eq!(commands.over(now + Duration::from_secs(1)), Some(42));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Commands {
@@ -74,7 +77,16 @@ impl Commands {
     /// Takes a command. `number` is one that no command to this vehicle had lately: count on from a random one, or after a
     /// restart a vehicle could think that it has taken it. `false` when four wait. For a kill there is always room; a kill takes the place of a kill.
     pub fn say(&mut self, now: Instant, number: u32, command: GuidedCommand) -> bool {
-        let said = Said { number, command, until: now + PATIENCE, again_at: now };
+        self.say_since(now, now, number, command)
+    }
+
+    /// The same for a command that was asked for then: it is not said when it is older than a second, unless it kills or lands.
+    pub fn say_since(&mut self, now: Instant, asked: Instant, number: u32, command: GuidedCommand) -> bool {
+        let until = match command.kind {
+            GuidedKind::Kill | GuidedKind::Land => now + PATIENCE,
+            _ => asked + FRESH,
+        };
+        let said = Said { number, command, until, again_at: now };
         if !said.is_kill() {
             let place = self.waiting.iter_mut().take(WAITING).find(|place| place.is_none());
             return place.map(|place| *place = Some(said)).is_some();
@@ -119,7 +131,7 @@ impl Commands {
         is_done
     }
 
-    /// The number of a command that was not acknowledged in two seconds, or that a kill has ended. Nobody knows whether it was taken. Ask until there is
+    /// The number of a command that was not acknowledged in time, or that a kill has ended. Nobody knows whether it was taken. Ask until there is
     /// none, before anything is [said](Self::say): until then it takes its room.
     pub fn over(&mut self, now: Instant) -> Option<u32> {
         let is_over = |said: &Option<Said>| said.is_some_and(|said| now >= said.until);

@@ -122,7 +122,7 @@ fn a_vehicle_without_room_is_told_again_and_again() {
     let mut pair = Pair::new(1, 0);
     pair.has_room = false;
     pair.commands.say(pair.air.now, 7, command(GuidedKind::Hold));
-    pair.pass(50);
+    pair.pass(40);
     pair.has_room = true;
     pair.pass(4);
     assert_eq!((&pair.obeyed[..], &pair.done[..]), (&[GuidedKind::Hold][..], &[7][..]));
@@ -131,6 +131,27 @@ fn a_vehicle_without_room_is_told_again_and_again() {
     pair.commands.say(pair.air.now, 8, command(GuidedKind::Land));
     pair.pass(110);
     assert_eq!(pair.over, [8]);
+}
+
+#[test]
+fn what_is_older_than_a_second_is_not_said_but_a_kill_and_a_landing_are() {
+    use GuidedKind::{Arm, Hold, Kill, Land};
+    let asked = |kind, age| {
+        let mut commands = Commands::new();
+        let now = Instant::from_secs(100);
+        assert!(commands.say_since(now, now - Duration::from_millis(age), 1, command(kind)));
+        let said = (0..3_000).step_by(20).filter(|ms| commands.next(now + Duration::from_millis(*ms)).is_some());
+        (said.last(), commands.over(now + Duration::from_secs(2)))
+    };
+    // Of a radio that is gone, the last is what it may take after all.
+    for (age, last) in [(0, Some(960)), (500, Some(480)), (980, Some(0)), (1_000, None), (5_000, None), (20_000, None)]
+    {
+        for kind in [Arm, Hold] {
+            assert_eq!(asked(kind, age), (last, Some(1)), "{kind:?} after {age} ms");
+        }
+        assert_eq!(asked(Kill, age).0, Some(1_980));
+        assert_eq!(asked(Land, age).0, Some(1_980));
+    }
 }
 
 #[test]

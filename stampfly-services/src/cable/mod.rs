@@ -140,6 +140,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         let Some(payload) = Payload::decode(envelope.kind, body) else { return };
         self.station = Some(now);
         let number = envelope.number;
+        // MAVLink's own words behind it have no room for a time.
+        self.mavlink.mark(now, (), envelope.said.is_some_and(|said| is_late(now, said)));
         if envelope.table != self.table && !payload.is_kill() {
             self.foreign = self.foreign.wrapping_add(1);
             return self.say(

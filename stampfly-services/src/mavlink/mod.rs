@@ -67,6 +67,7 @@ pub use missions::ITEMS;
 use missions::Missions;
 use orders::Orders;
 pub use parameters::short_name;
+pub use pulse::Pulse;
 use said::Said;
 use stampfly_link::mavlink::dialects::common::{MavMessage, MavSeverity};
 use stampfly_link::mavlink::signing::{self, SigningKey, Untrusted, Verifier};
@@ -318,6 +319,11 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 Err(message) => answer::unreadable(turn, message),
             }
         }
+    }
+
+    /// A client that can tell says that what it sends from now on, for a moment, is late or is not.
+    pub(crate) fn mark(&mut self, now: Instant, from: C, is_late: bool) {
+        self.clients.iter_mut().filter(|known| known.id == from).for_each(|client| client.pulse.mark(now, is_late));
     }
 
     /// Sends a client a message by its number and fields. Nothing happens to one that is not

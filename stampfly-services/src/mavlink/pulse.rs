@@ -13,18 +13,22 @@ const BURST: Duration = Duration::from_millis(100);
 /// Heartbeats in one burst that a program without a delay does not send.
 const HEARTBEATS: u8 = 2;
 
-/// The heartbeats of one client.
+/// The heartbeats of one client, and what they show: what comes now may be old.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Pulse {
+pub struct Pulse {
     heard: Instant,
+    /// When the other end said that what comes behind was late.
+    late: Option<Instant>,
     /// Does this burst follow a silence, and how many heartbeats are in it?
     is_behind: bool,
     heartbeats: u8,
 }
 
 impl Pulse {
+    /// Nothing was heard.
+    #[must_use]
     pub const fn new() -> Self {
-        Self { heard: Instant::ZERO, is_behind: false, heartbeats: 0 }
+        Self { late: None, heard: Instant::ZERO, is_behind: false, heartbeats: 0 }
     }
 
     /// A frame has arrived.
@@ -36,9 +40,16 @@ impl Pulse {
         self.heartbeats = self.heartbeats.saturating_add(u8::from(is_heartbeat));
     }
 
+    /// The other end knows the vehicle's clock, and says with it whether what comes behind is late.
+    pub(crate) fn mark(&mut self, now: Instant, is_late: bool) {
+        self.late = is_late.then_some(now);
+    }
+
     /// May the frames that arrive now be older than a second?
-    pub const fn is_held(&self) -> bool {
-        self.is_behind && self.heartbeats >= HEARTBEATS
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        let is_late = self.late.is_some_and(|at| self.heard.since(at) <= BURST);
+        is_late || (self.is_behind && self.heartbeats >= HEARTBEATS)
     }
 }
 

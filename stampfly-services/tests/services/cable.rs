@@ -3,7 +3,7 @@
 use crate::common::{Board, Id, Two, Vehicle, topics};
 use proptest::prelude::*;
 use stampfly_flight::console::Request;
-use stampfly_link::mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage, MavType};
+use stampfly_link::mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage, MavType};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter, Tunnel};
 use stampfly_link::secure::Payload;
 use stampfly_services::Cockpit;
@@ -252,6 +252,44 @@ fn what_was_held_up_on_the_line_is_not_done_and_what_ends_a_flight_is() {
         line.ask(&command(GuidedKind::Hold), 1);
         line.vehicle.guided.pop().expect("it has reached the vehicle");
     }
+}
+
+#[test]
+fn orders_in_mavlinks_own_words_are_as_late_as_the_envelope_before_them() {
+    let mut line = Line::new();
+    let order = |line: &mut Line, command, param1, param3| {
+        let data = COMMAND_LONG_DATA { command, param1, param3, ..COMMAND_LONG_DATA::default() };
+        let message = MavMessage::COMMAND_LONG(data);
+        let mut room = [0; LONGEST];
+        line.writer.write(MavlinkVersion::V2, &message, &mut room).unwrap().to_vec()
+    };
+    let marked = |line: &mut Line, said, order: Vec<u8>| {
+        line.said = said;
+        line.now += Duration::from_millis(500);
+        let bytes = [line.frame(&Payload::Watch { topic: u16::MAX, period: 0 }, 1), order].concat();
+        line.hear(&bytes);
+        (line.vehicle.guided.drain(..).count(), line.vehicle.requests.drain(..).count())
+    };
+    let arm = order(&mut line, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0);
+    let motor = order(&mut line, MavCmd::MAV_CMD_DO_MOTOR_TEST, 1.0, 10.0);
+    line.now = Instant::from_secs(100);
+    for age in [1_500, 5_000, 20_000] {
+        for order in [&arm, &motor] {
+            let said = Some((line.now.as_micros() / 1_000) as u32 + 500 - age);
+            assert_eq!(marked(&mut line, said, order.clone()), (0, 0), "after {age} ms");
+        }
+        let said = Some((line.now.as_micros() / 1_000) as u32 + 500 - age);
+        let kill = order(&mut line, MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0, 0.0);
+        assert_eq!(marked(&mut line, said, kill), (1, 0), "it ends a flight");
+    }
+    // Fresh, without a time, and of another program than the one that was late, a moment later.
+    let said = Some((line.now.as_micros() / 1_000) as u32);
+    assert_eq!(marked(&mut line, said, motor.clone()), (0, 1));
+    assert_eq!(marked(&mut line, None, motor.clone()), (0, 1));
+    assert_eq!(marked(&mut line, Some(0), motor.clone()), (0, 0));
+    line.now += Duration::from_millis(500);
+    line.hear(&motor);
+    assert_eq!(line.vehicle.requests.len(), 1);
 }
 
 #[test]
