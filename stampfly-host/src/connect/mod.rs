@@ -96,12 +96,18 @@ enum State {
 }
 
 /// A program at MAVLink's ports.
-#[derive(Default)]
 struct Program {
     /// The frame that it is in the middle of.
     decoder: MavlinkDecoder<MavMessage>,
     /// Whether what it says was held up on its way here.
     pulse: Pulse,
+}
+
+impl Program {
+    /// One that has come now.
+    fn new(now: stampfly_types::Instant) -> Self {
+        Self { decoder: MavlinkDecoder::new(), pulse: Pulse::new(now) }
+    }
 }
 
 /// What is made of what the vehicle says.
@@ -243,14 +249,10 @@ impl<V: Vehicle> Ends<V> {
     fn programs(&mut self, now: stampfly_types::Instant, station: &mut Station, put: &mut Vec<u8>) {
         let Self { ports, programs, crew, answers, .. } = self;
         ports.receive(None, &mut |client, heard| match heard {
-            Heard::Opened => {
-                let mut program = Program::default();
-                program.pulse.hear(now, false);
-                programs.insert(client, program);
-            }
+            Heard::Opened => drop(programs.insert(client, Program::new(now))),
             Heard::Closed => drop(programs.remove(&client)),
             Heard::Bytes(bytes) => {
-                let Program { decoder, pulse } = programs.entry(client).or_default();
+                let Program { decoder, pulse } = programs.entry(client).or_insert_with(|| Program::new(now));
                 for byte in bytes {
                     let Some(frame) = decoder.feed(*byte) else { continue };
                     pulse.hear(now, frame.id == HEARTBEAT_DATA::ID);

@@ -91,7 +91,7 @@ impl<C> Client<C> {
             id,
             connection: None,
             heard: now,
-            pulse: Pulse::new(),
+            pulse: Pulse::new(now),
             stays,
             believed: false,
             now,

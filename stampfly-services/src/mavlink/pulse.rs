@@ -10,8 +10,11 @@ use stampfly_types::{Duration, Instant};
 const SILENCE: Duration = Duration::from_millis(1_400);
 /// Delayed frames arrive within this time of one another.
 const BURST: Duration = Duration::from_millis(100);
-/// Heartbeats in one burst that a program without a delay does not send.
+/// Heartbeats together that a program without a delay does not send.
 const HEARTBEATS: u8 = 2;
+/// So near together are those that a network has kept. One that goes with each question of a program
+/// comes an answer later.
+const TOGETHER: Duration = Duration::from_millis(4);
 
 /// The heartbeats of one client, and what they show: what comes now may be old.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,13 +25,15 @@ pub struct Pulse {
     /// Does this burst follow a silence, and how many heartbeats are in it?
     is_behind: bool,
     heartbeats: u8,
+    /// When the last one came.
+    beat: Instant,
 }
 
 impl Pulse {
-    /// Nothing was heard.
+    /// The client has come now.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { late: None, heard: Instant::ZERO, is_behind: false, heartbeats: 0 }
+    pub const fn new(now: Instant) -> Self {
+        Self { late: None, heard: now, is_behind: false, heartbeats: 0, beat: Instant::ZERO }
     }
 
     /// A frame has arrived.
@@ -37,7 +42,11 @@ impl Pulse {
             (self.is_behind, self.heartbeats) = (now.since(self.heard) > SILENCE, 0);
         }
         self.heard = now;
-        self.heartbeats = self.heartbeats.saturating_add(u8::from(is_heartbeat));
+        if is_heartbeat {
+            let is_alone = self.heartbeats < HEARTBEATS && now.since(self.beat) > TOGETHER;
+            self.heartbeats = if is_alone { 1 } else { self.heartbeats.saturating_add(1) };
+            self.beat = now;
+        }
     }
 
     /// The other end knows the vehicle's clock, and says with it whether what comes behind is late.
@@ -64,7 +73,7 @@ mod tests {
 
     #[test]
     fn what_comes_behind_heartbeats_that_were_held_up_may_be_as_old_as_they() {
-        let mut pulse = Pulse::new();
+        let mut pulse = Pulse::new(Instant::ZERO);
         assert!((1..5).all(|second| !hear(&mut pulse, 1_000 * second, true)));
         assert!(!hear(&mut pulse, 9_000, true), "one may have been sent just now");
         assert!(hear(&mut pulse, 9_001, true) && hear(&mut pulse, 9_002, false) && hear(&mut pulse, 9_090, true));
@@ -72,8 +81,18 @@ mod tests {
     }
 
     #[test]
+    fn a_heartbeat_with_each_of_several_questions_behind_a_silence_is_no_delay() {
+        let mut pulse = Pulse::new(Instant::from_millis(40_000));
+        for ms in [40_000, 40_005, 40_010, 43_000, 43_020, 43_025, 50_000, 50_005] {
+            assert!(!hear(&mut pulse, ms, true) && !hear(&mut pulse, ms, false), "{ms} ms");
+        }
+        // Once it is seen, it is so to the end of what was kept.
+        assert!(!hear(&mut pulse, 60_000, true) && hear(&mut pulse, 60_001, true) && hear(&mut pulse, 60_090, true));
+    }
+
+    #[test]
     fn a_program_that_waits_for_something_before_it_asks_is_not_taken_for_late() {
-        let mut pulse = Pulse::new();
+        let mut pulse = Pulse::new(Instant::ZERO);
         for second in [1, 2, 3, 4, 9, 20, 60] {
             assert!(!hear(&mut pulse, 1_000 * second, true) && !hear(&mut pulse, 1_000 * second, false));
         }

@@ -390,6 +390,23 @@ fn a_command_that_a_network_has_held_up_is_refused_and_what_ends_a_flight_is_don
 }
 
 #[test]
+fn a_program_that_comes_and_asks_at_once_is_not_taken_for_held_up() {
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    let hold = command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]);
+    // At any time of the vehicle's.
+    for begun in [0, 1_000, 40_000] {
+        let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+        for ms in [begun, begun + 5, begun + 25, begun + 3_000, begun + 3_005] {
+            let now = Instant::from_millis(ms);
+            station.asks(now, &mut mavlink, &mut vehicle, &heartbeat);
+            let answers = station.asks(now, &mut mavlink, &mut vehicle, &hold);
+            assert_ne!(result(&answers), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED), "{ms} ms");
+        }
+        assert!(!vehicle.guided.is_empty());
+    }
+}
+
+#[test]
 fn what_the_vehicle_has_said_itself_does_not_come_back() {
     let key = SigningKey::from_passphrase("a phrase");
     let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key, 1_000), Vehicle::standing());
