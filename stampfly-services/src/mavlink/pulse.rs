@@ -15,6 +15,9 @@ const HEARTBEATS: u8 = 2;
 /// So near together are those that a network has kept. One that goes with each question of a program
 /// comes an answer later.
 const TOGETHER: Duration = Duration::from_millis(4);
+/// Heartbeats that are farther apart than this come at their pace, and a burst is over, also when a
+/// program streams without a pause.
+const PACE: Duration = Duration::from_millis(500);
 
 /// The heartbeats of one client, and what they show: what comes now may be old.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,7 +46,11 @@ impl Pulse {
         }
         self.heard = now;
         if is_heartbeat {
-            let is_alone = self.heartbeats < HEARTBEATS && now.since(self.beat) > TOGETHER;
+            let since = now.since(self.beat);
+            if self.heartbeats > 0 && since > PACE {
+                (self.is_behind, self.heartbeats) = (false, 0);
+            }
+            let is_alone = self.heartbeats < HEARTBEATS && since > TOGETHER;
             self.heartbeats = if is_alone { 1 } else { self.heartbeats.saturating_add(1) };
             self.beat = now;
         }

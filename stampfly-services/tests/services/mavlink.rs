@@ -407,6 +407,37 @@ fn a_program_that_comes_and_asks_at_once_is_not_taken_for_held_up() {
 }
 
 #[test]
+fn a_program_that_streams_is_obeyed_again_when_its_heartbeats_come_at_their_pace() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
+    let hold = command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]);
+    let ping = MavMessage::TIMESYNC(TIMESYNC_DATA::default());
+    // Twenty frames a second without a pause, a heartbeat a second; held up from 5 s to 8 s.
+    let mut obeyed = [0; 12];
+    for ms in (0..12_000).step_by(50) {
+        if (5_000..8_000).contains(&ms) {
+            continue;
+        }
+        let now = Instant::from_millis(ms);
+        let from = if ms == 8_000 { 5_000 } else { ms };
+        for said in (from..=ms).step_by(50) {
+            if said % 1_000 == 0 {
+                station.asks(now, &mut mavlink, &mut vehicle, &heartbeat);
+            }
+            station.asks(now, &mut mavlink, &mut vehicle, &ping);
+            if said % 200 == 100 {
+                vehicle.guided.clear();
+                station.asks(now, &mut mavlink, &mut vehicle, &hold);
+                obeyed[said as usize / 1_000] += vehicle.guided.len();
+            }
+        }
+    }
+    assert_eq!(obeyed[..5], [5; 5]);
+    assert_eq!(obeyed[6..8], [0; 2], "those behind the second heartbeat");
+    assert_eq!(obeyed[9..], [5; 3], "it is back");
+}
+
+#[test]
 fn what_the_vehicle_has_said_itself_does_not_come_back() {
     let key = SigningKey::from_passphrase("a phrase");
     let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key, 1_000), Vehicle::standing());
