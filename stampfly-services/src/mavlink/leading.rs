@@ -1,8 +1,9 @@
-//! Velocities that a program sends again and again.
+//! Velocities and accelerations that a program sends again and again.
 //!
 //! A vehicle is asked to fly to places, and knows how fast it may get there. So a velocity is flown
 //! as a way-point that moves ahead of the vehicle's path at this velocity, fifty times a second:
-//! the path follows at the distance in which it could stop, whatever its limits are. When the
+//! the path follows at the distance in which it could stop, whatever its limits are. An
+//! acceleration changes the velocity at which the way-point moves, from the path's own on. When the
 //! program has said nothing for half a second, the vehicle stays where it is, as PX4 and ArduPilot
 //! do after half a second and after three.
 //!
@@ -25,6 +26,16 @@ const AHEAD: f32 = 0.15;
 const TO_STOP: f32 = 0.6;
 /// The heading that is wanted is at most so far ahead, rad.
 const TURN_AHEAD: f32 = 0.5;
+/// The distance in which the path could stop grows with its velocity, so a way-point that gets faster
+/// has to run ahead: by this share of what the path is slower than it, and less below this speed,
+/// m/s, at which that distance is short.
+const RUNS_AHEAD: f32 = 3.0;
+const FAST: f32 = 0.4;
+/// The velocity that accelerations lead to is at most so far from the path's, m/s. One that far ahead
+/// of a path that may not be faster is turned round at the path, which could stop in about this time,
+/// s: it brakes when it is asked to.
+const FROM_PATH: f32 = 0.25;
+const TO_BRAKE: f32 = 0.4;
 /// The path may be faster than the way-point by this factor, as fast as it is, and this fast at
 /// least, m/s, so that it comes to where a slow one is.
 const FASTER: f32 = 1.2;
@@ -35,8 +46,10 @@ const LONGEST: f32 = 0.1;
 /// How a program wants the vehicle to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
-    /// World frame, m/s.
-    pub velocity: Vec3,
+    /// World frame, m/s. An axis without one keeps the velocity that it has.
+    pub velocity: [Option<f32>; 3],
+    /// World frame, m/s²: how the velocity changes from the instant on at which this was said.
+    pub acceleration: [f32; 3],
     /// Down, m: instead of a vertical velocity.
     pub down: Option<f32>,
     /// Heading, rad; `None` keeps it.
@@ -62,8 +75,9 @@ struct Lead<C> {
     client: C,
     seat: Seat,
     motion: Motion,
-    /// The way-point, and the heading there.
+    /// The way-point, how fast it moves, and the heading there.
     place: Vec3,
+    velocity: Vec3,
     yaw: f32,
     begun: Instant,
     heard: Instant,
@@ -124,7 +138,8 @@ impl<C: Copy + PartialEq> Leading<C> {
         let path = path(cockpit)?;
         let (place, yaw) = (path.position, motion.yaw.unwrap_or(path.yaw));
         let (motion, stage) = (*motion, Stage::Begins);
-        let mut lead = Lead { client, seat, motion, place, yaw, begun: now, heard: now, moved: now, stage };
+        let velocity = path.velocity;
+        let mut lead = Lead { client, seat, motion, place, velocity, yaw, begun: now, heard: now, moved: now, stage };
         lead.move_on(now, &path, cockpit).map_err(NotLed::Refused)?;
         self.0 = Some(lead);
         Ok(true)
@@ -159,18 +174,38 @@ impl<C: Copy + PartialEq> Leading<C> {
 
 impl<C> Lead<C> {
     fn move_on(&mut self, now: Instant, path: &Setpoint, cockpit: &mut dyn Cockpit) -> Result<(), Refusal> {
-        let Motion { velocity, down, yaw_rate, .. } = self.motion;
+        let Motion { down, yaw_rate, .. } = self.motion;
         let dt = now.since(self.moved).seconds().min(LONGEST);
+        let said = now.since(self.heard).seconds();
         self.moved = now;
-        let mut place = self.place + velocity * dt;
-        for (place, (path, velocity)) in
-            [&mut place.x, &mut place.y, &mut place.z].into_iter().zip(path.position.iter().zip(path.velocity.iter()))
+        let wanted = self.motion.velocity.into_iter().zip(self.motion.acceleration);
+        let lead = self.place.iter_mut().zip(self.velocity.iter_mut());
+        for ((wanted, (place, velocity)), (path, path_velocity)) in
+            wanted.zip(lead).zip(path.position.iter().zip(path.velocity.iter()))
         {
+            let behind = match wanted {
+                (Some(said_velocity), acceleration) => {
+                    *velocity = said_velocity + acceleration * said;
+                    0.0
+                }
+                (None, acceleration) => {
+                    let ahead = (*velocity - path_velocity) * acceleration;
+                    if ahead < -0.9 * FROM_PATH * acceleration.abs() {
+                        (*velocity, *place) = (*path_velocity, path + path_velocity * TO_BRAKE);
+                    }
+                    let from_path = *velocity + acceleration * dt - path_velocity;
+                    let from_path = from_path.clamp(-FROM_PATH, FROM_PATH);
+                    *velocity = path_velocity + from_path;
+                    from_path
+                }
+            };
             // Behind a vehicle that cannot follow, it waits.
             let most = AHEAD + TO_STOP * velocity.abs();
-            *place = path + (*place - path).max(-most).min(most);
+            let runs_ahead = RUNS_AHEAD * (velocity.abs() / FAST).min(1.0);
+            let moved = *place + (*velocity + runs_ahead * behind) * dt;
+            *place = path + (moved - path).max(-most).min(most);
         }
-        self.place = place;
+        let (mut place, velocity) = (self.place, self.velocity);
         if yaw_rate != 0.0 {
             let ahead = math::wrap_angle(self.yaw + yaw_rate * dt - path.yaw);
             self.yaw = math::wrap_angle(path.yaw + ahead.clamp(-TURN_AHEAD, TURN_AHEAD));

@@ -4,11 +4,11 @@
 //! |---|---|
 //! | `SET_POSITION_TARGET_LOCAL_NED` with a place | the place; velocities beside it are not needed |
 //! | with velocities | [the velocity](super::leading), with a height instead of the vertical one if there is one; heading or rate of turn |
-//! | with accelerations alone | nothing |
+//! | with accelerations | the velocity changes so; without velocities, the one that the vehicle has |
 //! | `SET_POSITION_TARGET_GLOBAL_INT` | the same, of a vehicle that knows where on Earth it is |
 //!
-//! Others are refused aloud. Attitudes are among them: a program that flies those has to hear the
-//! vehicle within a hundredth of a second.
+//! Others are refused aloud. Attitudes and forces are among them: a program that flies those has to
+//! hear the vehicle within a hundredth of a second.
 
 use super::commands::Turn;
 use super::leading::{Motion, NotLed};
@@ -24,13 +24,15 @@ const NO_PLACE: Mask = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE.union(Mask::POSIT
 const NO_HEIGHT: Mask = Mask::POSITION_TARGET_TYPEMASK_Z_IGNORE;
 const NO_VELOCITY: Mask = Mask::POSITION_TARGET_TYPEMASK_VX_IGNORE.union(Mask::POSITION_TARGET_TYPEMASK_VY_IGNORE);
 const NO_CLIMB: Mask = Mask::POSITION_TARGET_TYPEMASK_VZ_IGNORE;
-const NO_ACCELERATION: Mask = Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE
-    .union(Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE)
-    .union(Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE);
+const NO_ACCELERATION: Mask = Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE.union(Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE);
+const NO_LIFT: Mask = Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE;
+const FORCES: Mask = Mask::POSITION_TARGET_TYPEMASK_FORCE_SET;
 const NO_YAW: Mask = Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE;
 const NO_YAW_RATE: Mask = Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE;
 /// No number of a velocity is beyond this, m/s, rad, rad/s, m.
 const FASTEST: f32 = 100.0;
+/// No acceleration is beyond this, m/s²: twice that of gravity.
+const HARDEST: f32 = 20.0;
 
 /// Flies a set-point, or says why not.
 pub(super) fn fly<C: Copy + PartialEq, const ITEMS: usize>(
@@ -43,14 +45,17 @@ pub(super) fn fly<C: Copy + PartialEq, const ITEMS: usize>(
         return turn.client.complain(Unserved::Target, &grounded(&status), turn.put);
     }
     let Some((_, estimate)) = turn.cockpit.view().estimate() else { return };
+    let is_led = !mask.intersects(NO_VELOCITY)
+        || !mask.intersects(NO_ACCELERATION)
+        || !mask.contains(NO_HEIGHT | NO_CLIMB | NO_LIFT);
     if !mask.intersects(NO_PLACE | NO_HEIGHT) {
         turn.go_to(target, &estimate);
-    } else if mask.contains(NO_PLACE) && !(mask.intersects(NO_VELOCITY) && mask.contains(NO_HEIGHT | NO_CLIMB)) {
+    } else if mask.contains(FORCES) && !mask.contains(NO_ACCELERATION | NO_LIFT) {
+        turn.client.complain(Unserved::Target, &"forces are not flown", turn.put);
+    } else if mask.contains(NO_PLACE) && is_led {
         turn.lead(target, &estimate, &status);
-    } else if !mask.contains(NO_ACCELERATION) {
-        turn.client.complain(Unserved::Acceleration, &"send places or velocities", turn.put);
     } else {
-        turn.client.complain(Unserved::Target, &"no place and no velocity in it", turn.put);
+        turn.client.complain(Unserved::Target, &"no place, velocity or acceleration in it", turn.put);
     }
 }
 
@@ -137,15 +142,18 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         }
     }
 
-    /// Leads the vehicle at a velocity.
+    /// Leads the vehicle at a velocity, or by an acceleration.
     fn lead(&mut self, target: &SET_POSITION_TARGET_LOCAL_NED_DATA, estimate: &StateEstimate, status: &FlightStatus) {
         let mask = target.type_mask;
         let part = |ignored: Mask, number: f32| if mask.intersects(ignored) { 0.0 } else { number };
-        let asked = Vec3::new(part(NO_VELOCITY, target.vx), part(NO_VELOCITY, target.vy), part(NO_CLIMB, target.vz));
-        let velocity = match target.coordinate_frame {
-            MavFrame::MAV_FRAME_LOCAL_NED | MavFrame::MAV_FRAME_LOCAL_OFFSET_NED => asked,
+        let velocity = Vec3::new(part(NO_VELOCITY, target.vx), part(NO_VELOCITY, target.vy), part(NO_CLIMB, target.vz));
+        let acceleration =
+            Vec3::new(part(NO_ACCELERATION, target.afx), part(NO_ACCELERATION, target.afy), part(NO_LIFT, target.afz));
+        let [velocity, acceleration] = match target.coordinate_frame {
+            MavFrame::MAV_FRAME_LOCAL_NED | MavFrame::MAV_FRAME_LOCAL_OFFSET_NED => [velocity, acceleration],
             MavFrame::MAV_FRAME_BODY_NED | MavFrame::MAV_FRAME_BODY_OFFSET_NED | MavFrame::MAV_FRAME_BODY_FRD => {
-                frame::from_yaw(frame::yaw(&estimate.attitude)).transform_vector(&asked)
+                let heading = frame::from_yaw(frame::yaw(&estimate.attitude));
+                [velocity, acceleration].map(|vector| heading.transform_vector(&vector))
             }
             _ => return self.client.complain(Unserved::Target, &"not in this frame", self.put),
         };
@@ -154,10 +162,17 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         let yaw = (!mask.contains(NO_YAW)).then_some(target.yaw);
         let yaw_rate = if yaw.is_none() { part(NO_YAW_RATE, target.yaw_rate) } else { 0.0 };
         let numbers = [velocity.norm(), yaw_rate, yaw.unwrap_or_default(), down.unwrap_or_default()];
-        if !numbers.iter().all(|number| number.abs() <= FASTEST) {
+        // What is no number is within no limit.
+        let is_sane = numbers.iter().all(|number| number.abs() <= FASTEST) && acceleration.norm() <= HARDEST;
+        if !is_sane {
             return self.client.complain(Unserved::Target, &Refusal::Range, self.put);
         }
-        let motion = Motion { velocity, down, yaw, yaw_rate };
+        // Without a velocity of its own, an acceleration changes the one that the vehicle has.
+        let keeps = mask.intersects(NO_VELOCITY) && !mask.intersects(NO_ACCELERATION);
+        let keeps_climb = mask.contains(NO_CLIMB) && !mask.contains(NO_LIFT) && down.is_none();
+        let said = |keeps: bool, number: f32| (!keeps).then_some(number);
+        let velocity = [said(keeps, velocity.x), said(keeps, velocity.y), said(keeps_climb, velocity.z)];
+        let motion = Motion { velocity, acceleration: acceleration.to_array(), down, yaw, yaw_rate };
         match self.leading.hear(self.now, self.client.id, self.seat, &motion, self.cockpit) {
             Ok(false) => {}
             Ok(true) => {

@@ -15,9 +15,8 @@ const AGAIN: u16 = 10;
 /// A kind of message that is not obeyed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unserved {
-    /// To fly to a place, or at a velocity.
+    /// To fly to a place, at a velocity, or with an acceleration.
     Target,
-    Acceleration,
     Attitude,
     Override,
     Sticks,
@@ -34,7 +33,6 @@ impl Unserved {
     const fn name(self) -> &'static str {
         match self {
             Self::Target => "set-point not flown",
-            Self::Acceleration => "acceleration not flown",
             Self::Attitude => "attitude not flown",
             Self::Override => "RC override not flown",
             Self::Sticks => "sticks not flown",

@@ -16,7 +16,11 @@ const IDENTITY: Identity =
 const VELOCITY: u16 = 0b1101_1100_0111;
 const VELOCITY_AND_RATE: u16 = 0b0101_1100_0111;
 const VELOCITY_AND_HEIGHT: u16 = 0b1101_1110_0011;
+/// Accelerations alone, with velocities, with a height, and as forces.
 const ACCELERATION: u16 = 0b1100_0011_1111;
+const VELOCITY_AND_ACCELERATION: u16 = 0b1100_0000_0111;
+const ACCELERATION_AND_HEIGHT: u16 = 0b1101_0011_1011;
+const FORCE: u16 = 0b1110_0011_1111;
 const WORLD: MavFrame = MavFrame::MAV_FRAME_LOCAL_NED;
 const BODY: MavFrame = MavFrame::MAV_FRAME_BODY_NED;
 /// ms.
@@ -213,6 +217,105 @@ fn a_velocity_may_be_the_vehicles_own_have_a_height_and_turn() {
     assert_eq!(scene.texts(), [""; 0]);
 }
 
+fn acceleration(mask: u16, frame: MavFrame, velocity: [f32; 3], [afx, afy, afz]: [f32; 3]) -> MavMessage {
+    let target = target(mask, frame, velocity);
+    MavMessage::SET_POSITION_TARGET_LOCAL_NED(SET_POSITION_TARGET_LOCAL_NED_DATA { afx, afy, afz, ..target })
+}
+
+/// An acceleration alone.
+fn accelerates(wanted: [f32; 3]) -> MavMessage {
+    acceleration(ACCELERATION, WORLD, [f32::NAN; 3], wanted)
+}
+
+#[test]
+fn an_acceleration_changes_the_velocity_for_as_long_as_it_is_said_and_half_a_second_after_the_last_one_it_holds() {
+    let mut scene = Scene::new();
+    // Half a metre a second more in each second; then as fast as it is.
+    for (wanted, [north, east, down]) in [
+        ([0.5, 0.0, 0.0], [0.5, 0.0, 0.0]),
+        ([0.0, 0.3, 0.0], [0.5, 0.3, 0.0]),
+        ([-0.5, 0.0, -0.2], [0.0, 0.3, -0.2]),
+        ([-0.5, -0.6, 0.2], [-0.5, -0.3, 0.0]),
+        ([0.5, 0.3, 0.0], [0.0, 0.0, 0.0]),
+    ] {
+        let before = scene.path.velocity;
+        scene.passes(500, Some(&accelerates(wanted)));
+        let half = (before + Vec3::new(north, east, down)) * 0.5;
+        assert!((scene.path.velocity - half).norm() < 0.13, "{:?} for {half:?}", scene.path.velocity);
+        scene.passes(500, Some(&accelerates(wanted)));
+        let end = Vec3::new(north, east, down);
+        assert!((scene.path.velocity - end).norm() < 0.13, "{:?} for {end:?}", scene.path.velocity);
+        scene.passes(1_000, Some(&accelerates([0.0; 3])));
+        near(scene.path.velocity, [north, east, down]);
+    }
+    // No faster than it may fly, and then it brakes as it is asked to: nothing has added up.
+    scene.passes(6_000, Some(&accelerates([0.5, 0.0, 0.0])));
+    near(scene.path.velocity, [1.0, 0.0, 0.0]);
+    scene.passes(1_000, Some(&accelerates([-0.5, 0.0, 0.0])));
+    let left = scene.path.velocity.x;
+    assert!((0.45..0.7).contains(&left), "{left}");
+    scene.passes(1_000, Some(&accelerates([0.0; 3])));
+
+    scene.asked();
+    scene.passes(460, None);
+    assert!(
+        scene.asked().iter().all(|command| command.kind == GuidedKind::WayPoint || command.kind == GuidedKind::Hold)
+    );
+    scene.passes(100, None);
+    assert_eq!(scene.asked().last().map(|command| command.kind), Some(GuidedKind::Hold));
+    scene.passes(1_500, None);
+    near(scene.path.velocity, [0.0; 3]);
+    assert_eq!((scene.asked(), scene.texts()), (vec![], vec![]), "nothing is asked for any more");
+}
+
+#[test]
+fn an_acceleration_is_bounded_by_the_path_and_stands_beside_velocities_heights_and_frames() {
+    let mut scene = Scene::new();
+    // As hard as the path may, 1.5 m/s²: what leans the vehicle by less than nine degrees.
+    let mut hardest = 0.0_f32;
+    for _ in 0..40 {
+        scene.passes(25, Some(&accelerates([19.0, 0.0, 0.0])));
+        hardest = hardest.max(scene.path.acceleration.norm());
+    }
+    assert!((0.5..1.51).contains(&hardest), "{hardest}");
+    near(scene.path.velocity, [1.0, 0.0, 0.0]);
+    scene.passes(3_000, Some(&velocity([0.0; 3])));
+    // Between two messages, a velocity goes on as its acceleration says.
+    let both = acceleration(VELOCITY_AND_ACCELERATION, WORLD, [0.3, 0.0, 0.0], [0.4, 0.0, 0.0]);
+    scene.says(&both);
+    scene.passes(450, None);
+    let fast = scene.path.velocity.x;
+    assert!((0.33..0.49).contains(&fast), "{fast}");
+    scene.passes(2_000, Some(&velocity([0.0; 3])));
+    // A height holds while it accelerates, to the right of a nose that points east.
+    let east = SET_POSITION_TARGET_LOCAL_NED_DATA {
+        yaw: core::f32::consts::FRAC_PI_2,
+        ..target(0b1001_1100_0111, WORLD, [0.0; 3])
+    };
+    scene.passes(3_000, Some(&MavMessage::SET_POSITION_TARGET_LOCAL_NED(east)));
+    scene.passes(1_000, Some(&acceleration(ACCELERATION, BODY, [0.0; 3], [0.0, 0.4, 0.0])));
+    scene.passes(800, Some(&accelerates([0.0; 3])));
+    near(scene.path.velocity, [-0.4, 0.0, 0.0]);
+    let high = target(ACCELERATION_AND_HEIGHT, WORLD, [0.0; 3]);
+    let high = SET_POSITION_TARGET_LOCAL_NED_DATA { z: -1.6, afx: 0.0, afy: 0.2, afz: 9.0, ..high };
+    scene.passes(2_000, Some(&MavMessage::SET_POSITION_TARGET_LOCAL_NED(high)));
+    assert!((scene.path.position.z + 1.6).abs() < 0.03, "{:?}", scene.path);
+    assert!((scene.path.velocity.y - 0.4).abs() < 0.1, "{:?}", scene.path);
+    assert_eq!(scene.texts(), [""; 0]);
+}
+
+#[test]
+fn accelerations_that_are_no_numbers_or_more_than_any_vehicle_can_are_refused() {
+    for wanted in [[f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0], [0.0, 0.0, 21.0], [1e30, 1e30, 0.0]] {
+        for mask in [ACCELERATION, VELOCITY_AND_ACCELERATION] {
+            let mut scene = Scene::new();
+            scene.passes(500, Some(&acceleration(mask, WORLD, [0.1; 3], wanted)));
+            assert_eq!(scene.texts(), ["set-point not flown: a number is out of range"]);
+            assert_eq!(scene.asked(), []);
+        }
+    }
+}
+
 #[test]
 fn a_stream_does_not_take_the_vehicle_back_from_a_pilot() {
     let mut scene = Scene::new();
@@ -265,9 +368,12 @@ fn what_is_not_flown_is_refused_aloud_once_in_a_while() {
     let on_earth = SET_POSITION_TARGET_GLOBAL_INT_DATA { target_system, target_component, ..Default::default() };
     let local = |target| MavMessage::SET_POSITION_TARGET_LOCAL_NED(target);
     let table = [
-        (local(target(ACCELERATION, WORLD, [0.0; 3])), "acceleration not flown: send places or velocities"),
+        (local(target(FORCE, WORLD, [0.0; 3])), "set-point not flown: forces are not flown"),
         (local(unknown), "set-point not flown: not in this frame"),
-        (local(target(0b1111_1111_1111, WORLD, [0.0; 3])), "set-point not flown: no place and no velocity in it"),
+        (
+            local(target(0b1111_1111_1111, WORLD, [0.0; 3])),
+            "set-point not flown: no place, velocity or acceleration in it",
+        ),
         (local(target(VELOCITY, WORLD, [f32::NAN; 3])), "set-point not flown: a number is out of range"),
         (local(target(0, WORLD, [0.0; 3]).clone()), ""),
         (
