@@ -31,10 +31,10 @@ pub const ITEMS: usize = 64;
 /// the protocol's own figures.
 const SOONEST: Duration = Duration::from_millis(250);
 const RETRIES: u8 = 5;
-/// And after this long while no round trip was seen: a link of 1.2 s brings the first item before
-/// the third question.
-const FIRST: Duration = Duration::from_millis(500);
-/// And after this long at the latest: a partner that is gone holds the others up for 13 s, or 18 s
+/// And after this long while no round trip was seen: a link of 1.2 s that delays some frames by half
+/// as much brings the first item before the third question.
+const FIRST: Duration = Duration::from_millis(900);
+/// And after this long at the latest: a partner that is gone holds the others up for 15 s, or 18 s
 /// where a round trip takes more than a second.
 const LATEST: Duration = Duration::from_secs(3);
 
@@ -147,8 +147,14 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         self.upload.as_ref().is_some_and(|upload| upload.partner != *partner)
     }
 
+    /// Has this partner said so already, and is the first item still to come? The timer asks for it.
+    fn is_begun(&self, partner: &Partner<C>, count: u16) -> bool {
+        let upload = self.upload.as_ref().filter(|upload| upload.partner == *partner && upload.count == count);
+        upload.is_some_and(|upload| upload.items.is_empty())
+    }
+
     /// A station wants to upload so many items. One that says so during its own upload begins
-    /// again.
+    /// again, once an item has come.
     pub fn count(
         &mut self,
         now: Instant,
@@ -160,6 +166,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         let (partner, count) = (Partner { client: client.id, address }, request.count);
         let refusal = match request.mission_type {
             Kind::MAV_MISSION_TYPE_MISSION if self.is_busy(&partner) => Answer::MAV_MISSION_DENIED,
+            Kind::MAV_MISSION_TYPE_MISSION if self.is_begun(&partner, count) => return,
             Kind::MAV_MISSION_TYPE_MISSION if self.is_echo(now, &partner, count) => {
                 return acknowledge(client, address, (Answer::MAV_MISSION_ACCEPTED, MISSION, self.id), put);
             }

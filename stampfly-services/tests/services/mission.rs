@@ -215,8 +215,8 @@ fn a_mission_is_uploaded_and_the_same_is_downloaded() {
 fn an_item_that_does_not_come_is_asked_for_again_and_given_up_after_a_while() {
     let mut scene = Scene::new(Vehicle::standing());
     scene.says(count(2));
-    // A round trip was never seen: after 0.5, 1, 2, 3, 3 s, and given up after another 3.
-    assert_eq!(scene.passes(12_400, true, |_| {}).len(), 5);
+    // A round trip was never seen: after 0.9, 1.8, 3, 3, 3 s, and given up after another 3.
+    assert_eq!(scene.passes(14_600, true, |_| {}).len(), 5);
     let asked = scene.passes(200, true, |_| {});
     let requests = asked.iter().filter(|message| matches!(message, MavMessage::MISSION_REQUEST_INT(_))).count();
     assert_eq!(requests, 0);

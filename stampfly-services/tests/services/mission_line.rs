@@ -327,6 +327,87 @@ fn however_long_a_round_trip_takes_no_item_is_asked_for_more_than_twice_and_a_se
     }
 }
 
+/// What came of uploads and downloads on one kind of line.
+#[derive(Default)]
+struct Figures {
+    /// Most questions for one item, and for all fifty.
+    an_item: usize,
+    all: usize,
+    /// How often the station was told that it is accepted, at least and at most.
+    accepted: Vec<usize>,
+    denied: usize,
+    /// ms, at most.
+    up: u64,
+    down: u64,
+}
+
+/// The whole conversation: fifty items up and down, beside a second partner on the same connection
+/// that asks for its own upload three times.
+fn talk(quality: Quality, seed: u64, figures: &mut Figures) {
+    let mut line = Line::new(quality, seed);
+    let items = items();
+    let mut said = 0;
+    let result = line.uploads(&items, |line| {
+        if said < 3 && line.questions()[20 + 5 * said] > 0 {
+            said += 1;
+            let (target_system, target_component) = (7, 1);
+            let count = MISSION_COUNT_DATA { count: 2, target_system, target_component, ..Default::default() };
+            line.says(200, 190, &MavMessage::MISSION_COUNT(count));
+        }
+    });
+    assert_eq!((result, said), (ACCEPTED, 3));
+    figures.up = figures.up.max(line.now);
+    // Frames that are still on their way arrive.
+    for _ in 0..20_000 {
+        line.passes();
+    }
+    let questions = line.questions();
+    let told = line.results(255);
+    assert!(told.iter().all(|told| *told == (ACCEPTED, 1)), "one mission, and nothing after it: {told:?}");
+    let denied = line.results(200);
+    assert!(!denied.is_empty() && denied.iter().all(|(result, _)| *result == DENIED), "{denied:?}");
+    let begun = line.now;
+    same(&line.downloads(), &items);
+    figures.an_item = figures.an_item.max(questions.iter().copied().max().unwrap_or_default());
+    figures.all = figures.all.max(questions.iter().sum());
+    figures.accepted.push(told.len());
+    figures.denied += denied.len();
+    figures.down = figures.down.max(line.now - begun);
+}
+
+/// Questions for an item at most on a line that loses nothing, and the figures of every line.
+#[test]
+fn fifty_items_go_up_and_down_at_every_round_trip_on_clean_and_on_bad_lines() {
+    println!("| round trip | line | questions an item | for 50 | ACCEPTED | second partner | up | down |");
+    for round_trip in ROUND_TRIPS {
+        let lines = [
+            ("nothing lost", Quality::clean(round_trip), 1),
+            ("all twice", Quality { twice: 100, ..Quality::clean(round_trip) }, 1),
+            ("20 % late", Quality { late: 20, ..Quality::clean(round_trip) }, 20),
+            ("10 % lost, 10 % twice, 20 % late", Quality::bad(round_trip), 20),
+        ];
+        for (name, quality, seeds) in lines {
+            let mut figures = Figures::default();
+            (0..seeds).for_each(|seed| talk(quality, seed, &mut figures));
+            let Figures { an_item, all, accepted, denied, up, down } = figures;
+            let [least, most] = [accepted.iter().min(), accepted.iter().max()].map(|told| told.copied().unwrap_or(0));
+            println!(
+                "| {round_trip} ms | {name} | {an_item} | {all} | {least} to {most} times | denied {denied} of {} | {:.1} s | {:.1} s |",
+                3 * seeds,
+                up as f32 * 1e-3,
+                down as f32 * 1e-3
+            );
+            if quality.lost == 0 {
+                assert!(an_item <= 2 && all <= usize::from(2 * ITEMS), "{an_item} an item, {all} for all");
+            }
+            if name == "nothing lost" {
+                assert_eq!((least, most, denied), (1, 1, 3));
+            }
+            assert!(least > 0);
+        }
+    }
+}
+
 #[test]
 fn a_bad_line_costs_time_and_nothing_else() {
     for round_trip in ROUND_TRIPS {
