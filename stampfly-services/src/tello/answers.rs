@@ -21,7 +21,7 @@ pub(super) fn answer(query: TelloQuery, speed: f32, in_air: Duration, view: &Vie
         // In decimetres, as DJI's guide has it.
         TelloQuery::Height => TelloReply::Number((state.height * 10.0) as i32),
         TelloQuery::Attitude => TelloReply::Attitude(state.attitude),
-        TelloQuery::Speed => TelloReply::Number((speed * 100.0) as i32),
+        TelloQuery::Speed => TelloReply::Number((speed * 100.0 + 0.5) as i32),
         TelloQuery::SerialNumber => TelloReply::Text("STAMPFLY"),
         TelloQuery::Time => TelloReply::Number(state.time as i32),
         TelloQuery::Temperature => TelloReply::Number(state.temperature[0].into()),

@@ -179,6 +179,16 @@ fn a_program_that_says_nothing_for_fifteen_seconds_has_gone() {
 }
 
 #[test]
+fn a_speed_is_what_was_said() {
+    let mut talk = Talk::new(Vehicle::standing());
+    talk.hear(1, "command");
+    for speed in 10..=100 {
+        assert_eq!(talk.hear(1, &format!("speed {speed}")), ["ok"]);
+        assert_eq!(talk.hear(1, "speed?"), [speed.to_string()]);
+    }
+}
+
+#[test]
 fn what_is_no_command_says_why() {
     let mut talk = Talk::new(Vehicle::flying());
     talk.hear(1, "command");
