@@ -47,6 +47,7 @@ mod report;
 mod rover;
 mod safety_mode;
 mod safety_sensors;
+mod set_points;
 mod stm32_quad;
 mod swap;
 mod thorough;
