@@ -191,6 +191,23 @@ impl Msp {
 
     /// Takes what was heard, and answers each question in it.
     pub fn hear(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: &mut dyn FnMut(&[u8])) {
+        self.hear_any(now, false, bytes, cockpit, put);
+    }
+
+    /// The same of what lay in the caller's queue for more than a second: what would change
+    /// something is answered with an error, and changes nothing.
+    pub fn hear_late(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: &mut dyn FnMut(&[u8])) {
+        self.hear_any(now, true, bytes, cockpit, put);
+    }
+
+    fn hear_any(
+        &mut self,
+        now: Instant,
+        is_late: bool,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: &mut dyn FnMut(&[u8]),
+    ) {
         if now.since(self.heard) >= SILENCE {
             self.decoder.silence();
         }
@@ -199,7 +216,7 @@ impl Msp {
         for byte in bytes {
             match self.decoder.feed(*byte) {
                 Some(asked) if asked.direction != Direction::Request => {}
-                Some(asked) => say(&asked, answer(now, card, &asked, cockpit), put),
+                Some(asked) => say(&asked, answer(now, is_late, card, &asked, cockpit), put),
                 // One that there is no room for is none that is known here.
                 None => {
                     let asked = self.decoder.too_long().filter(|frame| frame.direction == Direction::Request);
@@ -222,19 +239,25 @@ fn say(asked: &MspFrame<'_>, payload: Option<Payload>, put: &mut dyn FnMut(&[u8]
 }
 
 /// What a question is answered with; `None` for an error.
-fn answer(now: Instant, card: &Card, asked: &MspFrame<'_>, cockpit: &mut dyn Cockpit) -> Option<Payload> {
+fn answer(
+    now: Instant,
+    is_late: bool,
+    card: &Card,
+    asked: &MspFrame<'_>,
+    cockpit: &mut dyn Cockpit,
+) -> Option<Payload> {
     let empty = Payload::new();
     let status = cockpit.view().state();
-    let disarmed = !status.armed;
+    let changes = !status.armed && !is_late;
     match asked.id {
         // SET_PID, SET_MISC, RESET_CONF, BIND of MultiWii, SET_REBOOT, EEPROM_WRITE, SELECT_SETTING of the only profile.
-        202 if disarmed => set_pids(card, asked.payload, cockpit.parameters()).then_some(empty),
-        207 if disarmed => set_misc(&card.misc?, asked.payload, cockpit.parameters()).then_some(empty),
-        208 if disarmed => cockpit.request(now, Request::ResetParameters).is_ok().then_some(empty),
-        241 if disarmed => cockpit.request(now, Request::Bind).is_ok().then_some(empty),
-        68 if disarmed => cockpit.request(now, Request::Restart).is_ok().then_some(empty),
-        250 if disarmed => cockpit.request(now, Request::SaveParameters).is_ok().then_some(empty),
-        210 if disarmed && asked.payload == [0] => Some(empty),
+        202 if changes => set_pids(card, asked.payload, cockpit.parameters()).then_some(empty),
+        207 if changes => set_misc(&card.misc?, asked.payload, cockpit.parameters()).then_some(empty),
+        208 if changes => cockpit.request(now, Request::ResetParameters).is_ok().then_some(empty),
+        241 if changes => cockpit.request(now, Request::Bind).is_ok().then_some(empty),
+        68 if changes => cockpit.request(now, Request::Restart).is_ok().then_some(empty),
+        250 if changes => cockpit.request(now, Request::SaveParameters).is_ok().then_some(empty),
+        210 if changes && asked.payload == [0] => Some(empty),
         112 => Some(pids(card, cockpit.parameters())),
         114 if card.misc.is_some() => Some(misc(&card.misc?, cockpit.parameters())),
         _ => identity(card, asked.id).or_else(|| state(card, asked.id, &status, cockpit)),

@@ -240,11 +240,14 @@ impl<H: Hands> Ground<H> {
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Opened) => {
                 self.msp.extend(self.about.card.map(|card| (from, Msp::new(card))));
             }
-            (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Bytes(bytes)) => {
+            (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Bytes(bytes) | Heard::Late(bytes)) => {
                 let Self { helm, places, hands, msp, .. } = self;
                 let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
-                if let Some((_, msp)) = msp.iter_mut().find(|(client, _)| *client == from) {
-                    msp.hear(now, bytes, &mut cockpit, &mut |frame| put(&from, frame));
+                let Some((_, msp)) = msp.iter_mut().find(|(client, _)| *client == from) else { return };
+                let answer = &mut |frame: &[u8]| put(&from, frame);
+                match heard {
+                    Heard::Late(_) => msp.hear_late(now, bytes, &mut cockpit, answer),
+                    _ => msp.hear(now, bytes, &mut cockpit, answer),
                 }
             }
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Closed) => self.msp.retain(|(client, _)| *client != from),
@@ -264,6 +267,10 @@ impl<H: Hands> Ground<H> {
                     true => mavlink.hear_local(now, from, bytes, &mut cockpit, put),
                     false => mavlink.hear(now, from, bytes, &mut cockpit, put),
                 }
+            }
+            Heard::Late(bytes) => {
+                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+                mavlink.hear_late(now, from, is_local, bytes, &mut cockpit, put);
             }
             Heard::Closed => {
                 mavlink.close(from, &mut Seated { helm, hands, view: View::new(samples, places) });

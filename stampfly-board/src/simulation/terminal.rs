@@ -16,6 +16,8 @@ use std::string::String;
 use std::vec::Vec;
 
 const PROMPT: &str = "> ";
+/// Ends a line without carrying it out.
+const CTRL_C: u8 = 3;
 
 /// What every command line of a vehicle shares.
 pub struct Desk<'d> {
@@ -96,6 +98,13 @@ impl Terminal {
             }
             self.screen.push_str(PROMPT);
         }
+    }
+
+    /// What was typed has waited for more than a second, and is forgotten with the line that it is
+    /// part of.
+    pub fn expire(&mut self) {
+        _ = self.editor.feed(CTRL_C, &mut self.screen);
+        _ = write!(self.screen, "expired: it came more than a second late, and was not done\r\n{PROMPT}");
     }
 
     /// Tells how far a calibration is, when there is something new to tell.

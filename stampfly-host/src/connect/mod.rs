@@ -251,8 +251,9 @@ impl<V: Vehicle> Ends<V> {
         ports.receive(None, &mut |client, heard| match heard {
             Heard::Opened => drop(programs.insert(client, Program::new(now))),
             Heard::Closed => drop(programs.remove(&client)),
-            Heard::Bytes(bytes) => {
+            Heard::Bytes(bytes) | Heard::Late(bytes) => {
                 let Program { decoder, pulse } = programs.entry(client).or_insert_with(|| Program::new(now));
+                pulse.lies(matches!(heard, Heard::Late(_)));
                 for byte in bytes {
                     let Some(frame) = decoder.feed(*byte) else { continue };
                     pulse.hear(now, frame.id == HEARTBEAT_DATA::ID);

@@ -2,6 +2,7 @@
 //! bounded length between the flight and the writer, so that a program that reads slowly does not
 //! hold up a flight.
 
+use super::age::Looks;
 use super::events::{Events, POLL};
 use super::greeting::{Foreign, Greeting};
 use crate::waited::has_only_waited;
@@ -13,6 +14,7 @@ use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
 
 /// Most connections to one port.
 const MOST: usize = 16;
@@ -136,12 +138,12 @@ impl Connections {
         let (connections, events) = (Arc::clone(self), events.clone());
         std::thread::spawn(move || write(writer, &waiting));
         std::thread::spawn(move || {
-            events.put(client, Heard::Opened);
+            events.put(client, Heard::Opened, Instant::now());
             if let Err(speaks) = read(stream, client, spec, &connections, &events) {
                 connections.end(spec.name, speaks);
             }
             connections.queues().remove(&client);
-            events.put(client, Heard::Closed);
+            events.put(client, Heard::Closed, Instant::now());
         });
     }
 
@@ -187,10 +189,15 @@ fn read(
 ) -> Result<(), Foreign> {
     let (mut part, mut greeting) = ([0; PART], Greeting::new(spec.speech));
     let (mut heard, mut is_shown) = (Ok(()), false);
+    let (mut looks, mut patience) = (Looks::begin(Instant::now()), POLL);
     while heard.is_ok() && events.are_open() && connections.has(&client) {
+        if patience != looks.patience() && stream.set_read_timeout(Some(looks.patience())).is_ok() {
+            patience = looks.patience();
+        }
         match stream.read(&mut part) {
             Ok(0) => break,
             Ok(length) => {
+                let since = looks.found(Instant::now());
                 heard = greeting.hear(part.get(..length).unwrap_or_default()).map(|bytes| {
                     if greeting.is_shown() && !core::mem::replace(&mut is_shown, true) {
                         connections.show(&client);
@@ -198,11 +205,11 @@ fn read(
                     // Waits while the flight has much to hear: the sender is held up, not the
                     // flight.
                     if !bytes.is_empty() {
-                        events.put(client, Heard::Bytes(&bytes));
+                        events.put(client, Heard::Bytes(&bytes), since);
                     }
                 });
             }
-            Err(error) if has_only_waited(&error) => {}
+            Err(error) if has_only_waited(&error) => looks.failed(Instant::now(), &error),
             Err(_) => break,
         }
     }

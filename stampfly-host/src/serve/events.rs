@@ -4,12 +4,12 @@ use stampfly_sim::vehicle::{Client, Heard};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How soon a thread notices that the ports are closed.
 pub(super) const POLL: Duration = Duration::from_millis(100);
 /// What may wait for the flight.
-const WAITING: usize = 1024;
+const WAITS: usize = 1024;
 
 /// What was heard, on its way to the flight.
 #[derive(Debug)]
@@ -19,10 +19,13 @@ pub(super) enum Event {
     Closed,
 }
 
+/// An event, of whom, and since when it may have waited.
+pub(super) type Waiting = (Client, Event, Instant);
+
 /// The sockets' end of the queue to the flight.
 #[derive(Clone, Debug)]
 pub(super) struct Events {
-    queue: SyncSender<(Client, Event)>,
+    queue: SyncSender<Waiting>,
     open: Arc<AtomicBool>,
 }
 
@@ -37,26 +40,26 @@ impl Events {
     }
 
     /// Waits for room. Nothing happens when the flight is over.
-    pub fn put(&self, client: Client, heard: Heard<'_>) {
-        _ = self.queue.send((client, event(heard)));
+    pub fn put(&self, client: Client, heard: Heard<'_>, since: Instant) {
+        _ = self.queue.send((client, event(heard), since));
     }
 
     /// Drops it when there is no room.
-    pub fn offer(&self, client: Client, heard: Heard<'_>) {
-        _ = self.queue.try_send((client, event(heard)));
+    pub fn offer(&self, client: Client, heard: Heard<'_>, since: Instant) {
+        _ = self.queue.try_send((client, event(heard), since));
     }
 }
 
 fn event(heard: Heard<'_>) -> Event {
     match heard {
         Heard::Opened => Event::Opened,
-        Heard::Bytes(bytes) => Event::Bytes(bytes.to_vec()),
+        Heard::Bytes(bytes) | Heard::Late(bytes) => Event::Bytes(bytes.to_vec()),
         Heard::Closed => Event::Closed,
     }
 }
 
 /// Both ends.
-pub(super) fn queue() -> (Events, Receiver<(Client, Event)>) {
-    let (queue, heard) = sync_channel(WAITING);
+pub(super) fn queue() -> (Events, Receiver<Waiting>) {
+    let (queue, heard) = sync_channel(WAITS);
     (Events { queue, open: Arc::new(AtomicBool::new(true)) }, heard)
 }

@@ -9,6 +9,7 @@
 //!
 //! What the bytes mean is the vehicle's business ([`Link`](stampfly_sim::vehicle::Link)).
 
+mod age;
 mod connections;
 mod events;
 mod flight_log;

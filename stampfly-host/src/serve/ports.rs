@@ -1,13 +1,16 @@
 //! The open ports of one vehicle: a thread a socket, one queue of bounded length to the flight.
 //!
 //! Datagrams that come while the queue is full are lost, as in a socket's own buffer; streams wait.
-//! The flight takes a bounded number in a tick, so a flood costs datagrams and no time.
+//! The flight takes a bounded number in a tick, so a flood costs datagrams and no time. What has
+//! waited for it for more than a second, it is told to be late.
 
+use super::age::Looks;
 use super::connections::{Connections, Ended};
-use super::events::{self, Event, Events, POLL};
+use super::events::{self, Event, Events, POLL, Waiting};
 use super::key::Key;
 use super::option::PortOption;
 use super::terminal;
+use stampfly_ground::FRESH;
 use stampfly_sim::vehicle::{Client, Guard, Heard, PortSpec, Ports, Signing, Transport};
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
@@ -94,7 +97,7 @@ pub trait Page: Send + Sync {
 /// The open ports of one vehicle.
 pub struct OpenPorts {
     events: Events,
-    heard: Mutex<Receiver<(Client, Event)>>,
+    heard: Mutex<Receiver<Waiting>>,
     /// Sockets of datagrams by port.
     sockets: Vec<Option<UdpSocket>>,
     connections: Arc<Connections>,
@@ -207,7 +210,7 @@ impl OpenPorts {
             Transport::UdpTo => {
                 let from = if address.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
                 let socket = UdpSocket::bind((from, 0))?;
-                events.offer(Client { port, address }, Heard::Opened);
+                events.offer(Client { port, address }, Heard::Opened, Instant::now());
                 Some(socket)
             }
             Transport::Tcp => {
@@ -282,7 +285,9 @@ impl OpenPorts {
             let port = self.specs.iter().position(|other| other.name == spec.name)?;
             Some(Client { port, address: *address })
         });
-        targets.chain(self.connections.all()).for_each(|client| self.events.offer(client, Heard::Opened));
+        targets
+            .chain(self.connections.all())
+            .for_each(|client| self.events.offer(client, Heard::Opened, Instant::now()));
     }
 
     /// Asks for the end of the flight.
@@ -306,11 +311,19 @@ impl Drop for OpenPorts {
 }
 
 fn receive(port: usize, socket: &UdpSocket, events: &Events) {
-    let mut buffer = [0; LONGEST];
+    let (mut buffer, mut looks) = ([0; LONGEST], Looks::begin(Instant::now()));
+    let mut patience = POLL;
     while events.are_open() {
-        // An error says that the time is over, or that an answer found its receiver gone.
-        if let Ok((length, address)) = socket.recv_from(&mut buffer) {
-            events.offer(Client { port, address }, Heard::Bytes(buffer.get(..length).unwrap_or_default()));
+        if patience != looks.patience() && socket.set_read_timeout(Some(looks.patience())).is_ok() {
+            patience = looks.patience();
+        }
+        match socket.recv_from(&mut buffer) {
+            Ok((length, address)) => {
+                let since = looks.found(Instant::now());
+                events.offer(Client { port, address }, Heard::Bytes(buffer.get(..length).unwrap_or_default()), since);
+            }
+            // The time is over, or an answer found its receiver gone.
+            Err(error) => looks.failed(Instant::now(), &error),
         }
     }
 }
@@ -331,9 +344,10 @@ impl Ports for OpenPorts {
                 Some(until) => heard.recv_timeout(until.saturating_duration_since(Instant::now())).ok(),
                 None => heard.try_recv().ok(),
             };
-            let Some((client, event)) = next else { return };
+            let Some((client, event, since)) = next else { return };
             match &event {
                 Event::Opened => hear(client, Heard::Opened),
+                Event::Bytes(bytes) if since.elapsed() > FRESH => hear(client, Heard::Late(bytes)),
                 Event::Bytes(bytes) => hear(client, Heard::Bytes(bytes)),
                 Event::Closed => hear(client, Heard::Closed),
             }

@@ -18,10 +18,12 @@ pub(super) const EXIST: bool = cfg!(unix);
 /// Opens one, and returns its name.
 #[cfg(unix)]
 pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Events) -> io::Result<String> {
+    use super::age::Looks;
     use crate::waited::has_only_waited;
     use serialport::{SerialPort as _, TTYPort};
     use stampfly_sim::vehicle::Heard;
     use std::io::{ErrorKind, Read, Write};
+    use std::time::Instant;
 
     let (mut ours, mut theirs) = TTYPort::pair()?;
     // Whoever opens it by its name is not the one who holds it here.
@@ -39,12 +41,15 @@ pub(super) fn open(client: Client, connections: &Arc<Connections>, events: &Even
         }
     });
     std::thread::spawn(move || {
-        events.put(client, Heard::Opened);
-        let mut part = [0; 512];
+        events.put(client, Heard::Opened, Instant::now());
+        let (mut part, mut looks) = ([0; 512], Looks::begin(Instant::now()));
         while events.are_open() {
             match ours.read(&mut part) {
-                Ok(length) => events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default())),
-                Err(error) if has_only_waited(&error) => {}
+                Ok(length) => {
+                    let since = looks.found(Instant::now());
+                    events.put(client, Heard::Bytes(part.get(..length).unwrap_or_default()), since);
+                }
+                Err(error) if has_only_waited(&error) => looks.failed(Instant::now(), &error),
                 Err(_) => break,
             }
         }

@@ -49,6 +49,8 @@ mod safety_mode;
 mod safety_sensors;
 mod set_points;
 mod stm32_quad;
+#[cfg(unix)]
+mod stopped;
 mod swap;
 mod thorough;
 mod tunes;

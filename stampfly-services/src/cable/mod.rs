@@ -116,6 +116,27 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         put: Put<'_>,
         typed: &mut dyn FnMut(u8),
     ) {
+        self.hear_any(now, false, bytes, cockpit, put, typed);
+    }
+
+    /// The same of what lay in the caller's queue for more than a second: frames of MAVLink are
+    /// [late](Mavlink::hear_late), a station has said itself when it has spoken, and what a person
+    /// has typed is dropped. Returns whether anything was.
+    pub fn hear_late(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) -> bool {
+        let mut is_dropped = false;
+        self.hear_any(now, true, bytes, cockpit, put, &mut |_| is_dropped = true);
+        is_dropped
+    }
+
+    fn hear_any(
+        &mut self,
+        now: Instant,
+        is_late: bool,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_>,
+        typed: &mut dyn FnMut(u8),
+    ) {
         // Its frames come byte by byte.
         self.mavlink.open_local(now, (), false);
         for byte in bytes {
@@ -126,7 +147,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             // A byte ends one frame at most.
             let mut tunnel = None;
             let mut keep = |seat: Seat, heard: Tunnel| tunnel = Some((seat, heard));
-            self.mavlink.hear_tunnels(now, (), &[*byte], cockpit, &mut |(), frame| put(frame), &mut keep);
+            let answer = &mut |(): &(), frame: &[u8]| put(frame);
+            self.mavlink.hear_tunnels(now, (), (&[*byte], is_late), cockpit, answer, &mut keep);
             if let Some((seat, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
                 self.open(now, seat, &tunnel.bytes, cockpit, put);
             }

@@ -226,35 +226,52 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
 
     /// Takes what a client has sent, and answers.
     pub fn hear(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_tunnels(now, from, bytes, cockpit, put, &mut |_, _| {});
+        self.hear_tunnels(now, from, (bytes, false), cockpit, put, &mut |_, _| {});
     }
 
-    /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with who has sent it.
+    /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with who has sent it. The
+    /// bytes may be [late](Self::hear_late).
     pub fn hear_tunnels(
         &mut self,
         now: Instant,
         from: C,
-        bytes: &[u8],
+        (bytes, is_late): (&[u8], bool),
         cockpit: &mut dyn Cockpit,
         put: Put<'_, C>,
         tunnel: &mut dyn FnMut(Seat, Tunnel),
     ) {
-        self.hear_any(now, from, self.guard.is_some(), bytes, cockpit, put, tunnel);
+        self.hear_any(now, from, (self.guard.is_some(), is_late), bytes, cockpit, put, tunnel);
     }
 
     /// Takes what a client on the same machine has sent, who need not sign although others must,
     /// and answers.
     pub fn hear_local(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_any(now, from, false, bytes, cockpit, put, &mut |_, _| {});
+        self.hear_any(now, from, (false, false), bytes, cockpit, put, &mut |_, _| {});
     }
 
-    // A client that is new has a guard, or need not sign.
-    #[allow(clippy::too_many_arguments, reason = "of one function with two names")]
+    /// Takes what lay in the caller's queue for more than a second, of a client that need not sign
+    /// if it is on the same machine, and answers. Nothing in it moves the vehicle or changes how it
+    /// flies, but for what ends a flight; its sender is told so.
+    pub fn hear_late(
+        &mut self,
+        now: Instant,
+        from: C,
+        is_local: bool,
+        bytes: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_, C>,
+    ) {
+        let guarded = !is_local && self.guard.is_some();
+        self.hear_any(now, from, (guarded, true), bytes, cockpit, put, &mut |_, _| {});
+    }
+
+    // A client that is new has a guard, or need not sign. What is late is said of these bytes.
+    #[allow(clippy::too_many_arguments, reason = "of one function with several names")]
     fn hear_any(
         &mut self,
         now: Instant,
         from: C,
-        guarded: bool,
+        (guarded, is_late): (bool, bool),
         bytes: &[u8],
         cockpit: &mut dyn Cockpit,
         put: Put<'_, C>,
@@ -273,6 +290,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         let Self { own, clients, missions, calibrating, orders, leading, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now, guard.as_ref());
+        client.pulse.lies(is_late);
         let connection = *client.connection.get_or_insert_with(|| cockpit.connection());
         let seat = |[system, component]: [u8; 2]| Seat::Mavlink { connection, system, component };
         for byte in bytes {

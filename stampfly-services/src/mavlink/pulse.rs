@@ -2,7 +2,8 @@
 //!
 //! MAVLink's messages carry no time, and a silent program may be waiting for an answer. But several
 //! heartbeats that arrive together after a silence were sent during it: the commands behind them
-//! may be as old as the silence. A command ahead of them cannot be told from a fresh one.
+//! may be as old as the silence. A command ahead of them cannot be told from a fresh one. How long
+//! something lay in a queue of this machine, the queue's owner knows and says.
 
 use stampfly_types::{Duration, Instant};
 
@@ -30,13 +31,21 @@ pub struct Pulse {
     heartbeats: u8,
     /// When the last one came.
     beat: Instant,
+    /// What comes now lay in a queue.
+    lay: bool,
 }
 
 impl Pulse {
     /// The client has come now.
     #[must_use]
     pub const fn new(now: Instant) -> Self {
-        Self { late: None, heard: now, is_behind: false, heartbeats: 0, beat: Instant::ZERO }
+        Self { late: None, heard: now, is_behind: false, heartbeats: 0, beat: Instant::ZERO, lay: false }
+    }
+
+    /// What comes until this is called again lay in a queue of this machine for more than a second,
+    /// or it did not.
+    pub const fn lies(&mut self, lay: bool) {
+        self.lay = lay;
     }
 
     /// A frame has arrived.
@@ -65,7 +74,7 @@ impl Pulse {
     #[must_use]
     pub fn is_held(&self) -> bool {
         let is_late = self.late.is_some_and(|at| self.heard.since(at) <= BURST);
-        is_late || (self.is_behind && self.heartbeats >= HEARTBEATS)
+        self.lay || is_late || (self.is_behind && self.heartbeats >= HEARTBEATS)
     }
 }
 

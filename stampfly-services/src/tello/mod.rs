@@ -8,15 +8,22 @@
 //! |---|---|
 //! | `action.rs` | what takes its time: taking off, landing, moving, turning |
 //! | `answers.rs` | questions, and the state |
+//! | `burst.rs` | whether what comes now was held up on its way |
+//!
+//! A datagram has no time. What lay in a queue of this machine for more than a second, and what comes
+//! with many sticks in one moment after a silence, is answered `error expired` and not done; `emergency`, `land` and `stop`
+//! are, and questions are answered.
 //!
 //! One program at a time: the last that said `command`. `emergency`, `land` and `stop` interrupt what goes on; anything else waits for nothing and is answered `error busy`.
 
 mod action;
 mod answers;
+mod burst;
 
 use crate::cockpit::Cockpit;
 use crate::refusal::{Connection, Seat};
 use action::{Action, Outcome};
+use burst::Burst;
 use stampfly_link::tello::{TelloCommand, TelloReply, TelloState};
 use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
@@ -46,6 +53,7 @@ pub enum Destination {
 pub struct Tello<C> {
     /// Who commands, since when at which connection, and when it was last heard.
     program: Option<(C, Instant)>,
+    burst: Burst,
     connection: Connection,
     action: Option<Action>,
     speed: f32,
@@ -72,6 +80,7 @@ impl<C> Tello<C> {
     pub const fn new() -> Self {
         Self {
             program: None,
+            burst: Burst::new(Instant::ZERO),
             connection: 0,
             action: None,
             speed: SPEED,
@@ -90,12 +99,40 @@ impl<C: Copy + PartialEq> Tello<C> {
 
     /// Takes a datagram.
     pub fn hear(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        self.hear_any(now, from, false, datagram, cockpit, put);
+    }
+
+    /// Takes a datagram that lay in the caller's queue for more than a second.
+    pub fn hear_late(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+        self.hear_any(now, from, true, datagram, cockpit, put);
+    }
+
+    fn hear_any(
+        &mut self,
+        now: Instant,
+        from: C,
+        lay: bool,
+        datagram: &[u8],
+        cockpit: &mut dyn Cockpit,
+        put: Put<'_, C>,
+    ) {
         let mut say = |reply: TelloReply<'_>| send(&from, &reply, put);
         let command = match TelloCommand::parse(datagram) {
             Ok(command) => command,
             Err(error) => return say(TelloReply::Refused(error)),
         };
         let is_program = self.program.is_some_and(|(program, _)| program == from);
+        let is_sticks = matches!(command, TelloCommand::Sticks { .. });
+        let is_held = is_program && self.burst.hear(now, is_sticks);
+        if (lay || is_held) && !is_never_late(&command) {
+            if is_sticks {
+                // Those before it are as old. A stranger's are nothing.
+                return if is_program {
+                    self.let_go(now, cockpit)
+                };
+            }
+            return say(TelloReply::Error("expired"));
+        }
         if command == TelloCommand::Command {
             let taken = self.program.filter(|(program, heard)| *program != from && now.since(*heard) < SILENCE);
             if taken.is_some() {
@@ -107,6 +144,7 @@ impl<C: Copy + PartialEq> Tello<C> {
                 self.connection = cockpit.connection();
             }
             self.program = Some((from, now));
+            self.burst = Burst::new(now);
             return say(TelloReply::Ok);
         }
         // Motors off is everybody's.
@@ -206,16 +244,27 @@ impl<C: Copy + PartialEq> Tello<C> {
         }
     }
 
+    /// The vehicle holds its place under the program's command, if it was flown by sticks.
+    fn let_go(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+        if self.sticks.take().is_some() {
+            _ = cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
+        }
+    }
+
     /// Passes on the sticks. When they stop coming, the vehicle holds its place under the program's command again.
     fn fly_by_hand(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
         let Some((at, input)) = self.sticks else { return };
         if now.since(at) < STICKS {
             _ = cockpit.steer(now, self.seat(), &PilotInput { arm: cockpit.view().state().armed, ..input });
         } else {
-            self.sticks = None;
-            _ = cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
+            self.let_go(now, cockpit);
         }
     }
+}
+
+/// Is it done whatever its age? What ends a flight or a move is; a question does nothing.
+const fn is_never_late(command: &TelloCommand) -> bool {
+    matches!(command, TelloCommand::Emergency | TelloCommand::Land | TelloCommand::Stop | TelloCommand::Query(_))
 }
 
 fn send<C>(to: &C, reply: &TelloReply<'_>, put: Put<'_, C>) {

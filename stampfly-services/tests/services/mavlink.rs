@@ -438,6 +438,42 @@ fn a_program_that_streams_is_obeyed_again_when_its_heartbeats_come_at_their_pace
 }
 
 #[test]
+fn what_lay_in_a_queue_is_refused_and_what_ends_a_flight_is_done() {
+    let (mut mavlink, mut vehicle, mut station) = (Mavlink::<u8>::new(IDENTITY), Vehicle::flying(), Station::new(1));
+    let mut late = |mavlink: &mut Mavlink<u8>, vehicle: &mut Vehicle, message: &MavMessage| {
+        let (bytes, mut sent) = (station.says(message), Vec::new());
+        mavlink.hear_late(Instant::from_secs(1), 1, true, &bytes, vehicle, &mut |_, frame| sent.extend(frame));
+        station.heard.clear();
+        station.hears(&sent);
+        std::mem::take(&mut station.heard)
+    };
+    let answers = late(&mut mavlink, &mut vehicle, &command(MavCmd::MAV_CMD_NAV_LOITER_UNLIM, [0.0; 7]));
+    assert_eq!(result(&answers), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED), "{answers:?}");
+    let (target_system, target_component) = (7, 1);
+    let place = SET_POSITION_TARGET_LOCAL_NED_DATA { target_system, target_component, ..Default::default() };
+    let sticks = MANUAL_CONTROL_DATA { target: 7, x: 500, ..Default::default() };
+    let parameter = PARAM_SET_DATA { target_system, target_component, ..Default::default() };
+    for message in [
+        MavMessage::SET_POSITION_TARGET_LOCAL_NED(place),
+        MavMessage::MANUAL_CONTROL(sticks),
+        MavMessage::PARAM_SET(parameter),
+        arm(),
+    ] {
+        late(&mut mavlink, &mut vehicle, &message);
+    }
+    assert_eq!((vehicle.guided.len(), vehicle.steered.len()), (0, 0));
+    // A question is answered, and what ends a flight is done.
+    let asked = late(&mut mavlink, &mut vehicle, &command(MavCmd::MAV_CMD_REQUEST_MESSAGE, [148.0; 7]));
+    assert_eq!(result(&asked), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED), "a command is a command");
+    assert!(!late(&mut mavlink, &mut vehicle, &MavMessage::TIMESYNC(TIMESYNC_DATA::default())).is_empty());
+    let kill = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [0.0, 21_196.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    for (message, kind) in [(command(MavCmd::MAV_CMD_NAV_LAND, [0.0; 7]), GuidedKind::Land), (kill, GuidedKind::Kill)] {
+        late(&mut mavlink, &mut vehicle, &message);
+        assert_eq!(vehicle.guided.last().map(|command| command.kind), Some(kind));
+    }
+}
+
+#[test]
 fn what_the_vehicle_has_said_itself_does_not_come_back() {
     let key = SigningKey::from_passphrase("a phrase");
     let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY).with_key(key, 1_000), Vehicle::standing());

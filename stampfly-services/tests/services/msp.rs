@@ -177,6 +177,24 @@ fn a_question_of_version_2_is_answered_in_version_2_and_an_answer_is_no_question
 }
 
 #[test]
+fn what_lay_in_a_queue_changes_nothing_and_is_answered() {
+    let mut vehicle = Vehicle::standing();
+    let before = vehicle.parameters.0;
+    for (id, payload) in [(202, &[40][..]), (207, &[0; 22]), (208, &[]), (241, &[]), (68, &[]), (250, &[]), (210, &[0])]
+    {
+        let (mut msp, mut answer) = (Msp::new(&CARD), Vec::<u8>::new());
+        let question = framed(b'<', id, payload);
+        msp.hear_late(Instant::ZERO, &question, &mut vehicle, &mut |frame| answer.extend(frame));
+        assert_eq!(answer, framed(b'!', id, &[]), "{id}");
+        // What only asks is answered as ever.
+        answer.clear();
+        msp.hear_late(Instant::ZERO, &framed(b'<', 2, &[]), &mut vehicle, &mut |frame| answer.extend(frame));
+        assert_eq!(answer, framed(b'>', 2, b"TEST"));
+    }
+    assert_eq!((vehicle.parameters.0, vehicle.requests), (before, vec![]));
+}
+
+#[test]
 fn a_question_that_was_cut_short_is_forgotten_after_a_silence() {
     let (mut msp, mut vehicle, mut answer) = (Msp::new(&CARD), Vehicle::standing(), Vec::<u8>::new());
     msp.hear(Instant::ZERO, b"$M<\x20\xCA", &mut vehicle, &mut |frame| answer.extend(frame));

@@ -21,11 +21,24 @@ impl Talk {
     }
 
     fn hear(&mut self, program: u8, text: &str) -> Vec<String> {
+        self.hear_any(program, text, false)
+    }
+
+    /// What lay in a queue for more than a second.
+    fn hear_late(&mut self, program: u8, text: &str) -> Vec<String> {
+        self.hear_any(program, text, true)
+    }
+
+    fn hear_any(&mut self, program: u8, text: &str, is_late: bool) -> Vec<String> {
         let Self { tello, vehicle, now, said, .. } = self;
-        tello.hear(*now, program, text.as_bytes(), vehicle, &mut |to, what, bytes| {
+        let put: &mut dyn FnMut(&u8, Destination, &[u8]) = &mut |to, what, bytes| {
             assert_eq!(what, Destination::Program);
             said.push((*to, String::from_utf8(bytes.to_vec()).expect("text")));
-        });
+        };
+        match is_late {
+            true => tello.hear_late(*now, program, text.as_bytes(), vehicle, put),
+            false => tello.hear(*now, program, text.as_bytes(), vehicle, put),
+        }
         self.answers()
     }
 
@@ -164,6 +177,82 @@ fn sticks_that_stop_coming_are_let_go() {
     talk.wait(50);
     assert!(talk.vehicle.steered.len() - count <= 25, "for half a second");
     assert_eq!(talk.kinds(), [GuidedKind::Hold]);
+}
+
+#[test]
+fn what_lay_in_a_queue_is_answered_with_an_error_and_not_done_and_what_ends_a_flight_is_done() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+    assert_eq!(talk.hear_late(1, "command"), ["error expired"]);
+    talk.hear(1, "command");
+    let late =
+        ["takeoff", "forward 50", "go 50 0 0 30", "cw 90", "flip l", "speed 80", "up 30", "command", "keepalive"];
+    for text in late {
+        assert_eq!(talk.hear_late(1, text), ["error expired"], "{text}");
+    }
+    assert_eq!(talk.hear_late(1, "rc 50 0 0 0"), Vec::<String>::new(), "sticks are not answered");
+    talk.wait(10);
+    assert_eq!((talk.kinds(), talk.vehicle.steered.len()), (vec![], 0));
+    assert_eq!(talk.hear_late(1, "speed?"), ["50"], "a question does nothing");
+    // Sticks of before are let go with those that are late.
+    talk.hear(1, "rc 50 0 0 0");
+    talk.wait(1);
+    talk.hear_late(1, "rc 50 0 0 0");
+    let steered = talk.vehicle.steered.len();
+    talk.wait(10);
+    assert_eq!((talk.kinds(), talk.vehicle.steered.len()), (vec![GuidedKind::Hold], steered));
+    for (text, kind) in [("stop", GuidedKind::Hold), ("land", GuidedKind::Land), ("emergency", GuidedKind::Kill)] {
+        talk.hear_late(1, text);
+        assert_eq!(talk.kinds().last(), Some(&kind), "{text}");
+    }
+    assert_eq!(talk.hear_late(2, "emergency"), ["ok"], "it is everybody's");
+}
+
+#[test]
+fn sticks_that_a_network_has_held_up_are_let_go_and_so_is_what_comes_with_them() {
+    for held in [60, 200] {
+        let mut talk = Talk::new(Vehicle::flying());
+        talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+        talk.hear(1, "command");
+        for _ in 0..20 {
+            talk.hear(1, "rc 30 0 0 0");
+            talk.wait(5);
+        }
+        talk.wait(held);
+        let steered = talk.vehicle.steered.len();
+        // All of them at once.
+        let answers: Vec<_> = (0..30).flat_map(|_| talk.hear(1, "rc 30 0 0 0")).collect();
+        assert_eq!(answers, Vec::<String>::new());
+        assert_eq!(talk.hear(1, "forward 100"), ["error expired"]);
+        talk.wait(10);
+        assert_eq!(talk.vehicle.steered.len(), steered, "held up for {held} turns");
+        assert!(talk.kinds().iter().all(|kind| *kind == GuidedKind::Hold), "{:?}", talk.kinds());
+        // It is back.
+        for _ in 0..5 {
+            talk.hear(1, "rc 30 0 0 0");
+            talk.wait(5);
+        }
+        assert_eq!(talk.vehicle.steered.len(), steered + 25);
+        talk.hear(1, "land");
+        assert_eq!(talk.kinds().last(), Some(&GuidedKind::Land));
+    }
+}
+
+#[test]
+fn a_program_that_says_a_lot_in_one_moment_after_a_silence_is_not_taken_for_late() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+    talk.hear(1, "command");
+    talk.wait(200);
+    for _ in 0..10 {
+        assert_eq!(talk.hear(1, "speed 50"), ["ok"]);
+        assert_eq!(talk.hear(1, "speed?"), ["50"]);
+    }
+    for _ in 0..3 {
+        talk.hear(1, "rc 0 0 0 0");
+    }
+    assert_eq!(talk.hear(1, "forward 100"), Vec::<String>::new());
+    assert_eq!(talk.kinds(), [GuidedKind::Hold, GuidedKind::WayPoint]);
 }
 
 #[test]

@@ -185,6 +185,9 @@ pub enum Heard<'b> {
     Opened,
     /// A datagram, or the next part of a stream.
     Bytes(&'b [u8]),
+    /// The same, which has waited for the vehicle for more than a second: what it asks for is not
+    /// wanted any more, but for landing and for motors off.
+    Late(&'b [u8]),
     /// It is gone.
     Closed,
 }

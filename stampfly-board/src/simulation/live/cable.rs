@@ -27,14 +27,18 @@ impl Cable {
     pub fn hear(
         &mut self,
         now: Instant,
-        bytes: &[u8],
+        (bytes, is_late): (&[u8], bool),
         controls: &mut Controls<'_>,
         desk: &Desk<'_>,
         put: &mut dyn FnMut(&[u8]),
     ) {
         let mut typed = std::vec::Vec::new();
         let mut cockpit = controls.seated(desk.newest);
-        self.line.hear(now, bytes, &mut cockpit, put, &mut |key| typed.push(key));
+        if !is_late {
+            self.line.hear(now, bytes, &mut cockpit, put, &mut |key| typed.push(key));
+        } else if self.line.hear_late(now, bytes, &mut cockpit, put) {
+            self.terminal.expire();
+        }
         let Board { config, console, seen, .. } = &mut controls.hands;
         self.terminal.send(now, &typed, desk, (config, console), |request, config| obey(request, seen, config));
         if !self.terminal.screen.is_empty() {

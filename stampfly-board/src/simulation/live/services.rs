@@ -86,8 +86,8 @@ impl<'b> Services<'b> {
         Desk { version: VERSION, newest, sensing, health, profile, facts: &[], beside }
     }
 
-    /// A cable's turn: what has come over it, or what is due.
-    fn plug(&mut self, now: Instant, from: Client, bytes: Option<&[u8]>, put: Put<'_>) {
+    /// A cable's turn: what has come over it, and whether it is late; or what is due.
+    fn plug(&mut self, now: Instant, from: Client, bytes: Option<(&[u8], bool)>, put: Put<'_>) {
         let seen = self.seen;
         let newest = seen.newest.borrow();
         let desk = self.desk(&newest);
@@ -119,16 +119,22 @@ impl Link for Services<'_> {
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
         let newest = self.seen.newest.borrow();
         match (from.port, heard) {
-            (TELLO, Heard::Bytes(text)) => {
+            (TELLO, Heard::Bytes(text) | Heard::Late(text)) => {
                 let tello_state = self.tello_state;
                 let mut cockpit = self.controls.seated(&*newest);
-                self.tello.hear(now, from, text, &mut cockpit, &mut |to, what, bytes| {
+                let answer = &mut |to: &Client, what, bytes: &[u8]| {
                     destination(*to, what, tello_state).into_iter().for_each(|to| put(&to, bytes));
-                });
+                };
+                match heard {
+                    Heard::Late(_) => self.tello.hear_late(now, from, text, &mut cockpit, answer),
+                    _ => self.tello.hear(now, from, text, &mut cockpit, answer),
+                }
             }
             (TELLO_STATE, Heard::Opened) => self.tello_state = Some(from.address.port()),
             (TELEMETRY, Heard::Opened) => self.telemetry = Some(from),
-            (STREAM, Heard::Bytes(request)) => self.seen.stream.borrow_mut().hear(now, from, request),
+            (STREAM, Heard::Bytes(request) | Heard::Late(request)) => {
+                self.seen.stream.borrow_mut().hear(now, from, request)
+            }
             (CONSOLE, Heard::Opened) => {
                 let mut terminal = Terminal::new();
                 terminal.greet(VERSION);
@@ -139,13 +145,17 @@ impl Link for Services<'_> {
                 drop(newest);
                 self.type_in(now, from, keys, put);
             }
+            (CONSOLE, Heard::Late(_)) => {
+                let terminal = self.terminals.iter_mut().find(|(client, _)| *client == from);
+                terminal.into_iter().for_each(|(_, terminal)| terminal.expire());
+            }
             (USB | USB_TCP, Heard::Opened) => {
                 let config = &self.controls.hands.config;
                 self.cables.push((from, Cable::new(self.controls.identity(), config)));
             }
-            (USB | USB_TCP, Heard::Bytes(bytes)) => {
+            (USB | USB_TCP, Heard::Bytes(bytes) | Heard::Late(bytes)) => {
                 drop(newest);
-                self.plug(now, from, Some(bytes), put);
+                self.plug(now, from, Some((bytes, matches!(heard, Heard::Late(_)))), put);
             }
             (USB | USB_TCP, Heard::Closed) => {
                 if let Some((_, cable)) = self.cables.iter_mut().find(|(client, _)| *client == from) {
@@ -154,7 +164,10 @@ impl Link for Services<'_> {
                 self.seen.tape.borrow_mut().ask(now, from, false);
                 self.cables.retain(|(client, _)| *client != from);
             }
-            (SEALED, Heard::Bytes(bytes)) => self.sealed.hear(now, from, bytes, &mut self.controls, put),
+            // Frames have times of their own.
+            (SEALED, Heard::Bytes(bytes) | Heard::Late(bytes)) => {
+                self.sealed.hear(now, from, bytes, &mut self.controls, put)
+            }
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             (_, heard) => {
                 let (desk, seen) = (self.desk(&newest), self.seen);
