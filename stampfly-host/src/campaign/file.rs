@@ -13,11 +13,13 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::record::Field;
 use parquet::schema::types::{Type, TypePtr};
+use std::cell::Cell;
 use std::fmt;
 use std::fs::{self, File};
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 /// Under this key the footer says what the file is a part of.
 const IDENTITY: &str = "stampfly.campaign";
@@ -109,11 +111,39 @@ fn write_column(
     .map(drop)
 }
 
+std::thread_local! {
+    /// Does this thread read a file whose panics are its errors?
+    static READS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs what may panic because a file is damaged, without a word of that. `None` when it did.
+fn without_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !READS.get() {
+                before(panic);
+            }
+        }));
+    });
+    READS.set(true);
+    let done = catch_unwind(AssertUnwindSafe(work));
+    READS.set(false);
+    done.ok()
+}
+
 /// Reads a file.
 ///
 /// # Errors
 /// When it cannot be read, or is no file of a campaign.
 pub fn read(path: &Path) -> Result<Contents, FileError> {
+    // The reader of Parquet takes some of what a damaged page says for granted, and panics.
+    let damaged = || Err(FileError { path: path.into(), cause: Cause::Contents("a page is damaged".into()) });
+    without_panic(|| read_rows(path)).unwrap_or_else(damaged)
+}
+
+fn read_rows(path: &Path) -> Result<Contents, FileError> {
     let with_path = |cause| FileError { path: path.into(), cause };
     let file = File::open(path).map_err(|error| with_path(Cause::Io("read", error)))?;
     let reader = SerializedFileReader::new(file).map_err(|error| with_path(error.into()))?;

@@ -14,6 +14,7 @@ mod doctor;
 mod doors;
 mod doorstep;
 mod estimate;
+mod every_file;
 mod fault_campaign;
 mod faults;
 mod figures;
