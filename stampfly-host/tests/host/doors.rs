@@ -3,7 +3,7 @@
 use crate::connect::alone;
 use crate::program::{Program, folder};
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, UdpSocket};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -58,4 +58,24 @@ fn a_port_that_commands_is_not_opened_to_others_without_a_key() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success() && said.contains("other machines"), "{port}: {said}");
     }
+}
+
+#[test]
+fn a_text_program_whose_state_port_is_off_hears_its_answers_alone() {
+    let _alone = alone();
+    let (_serving, place) = Program::serve(&folder("doors", "text"), "tello=0", &[]);
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a port");
+    socket.connect(place).expect("an address");
+    socket.set_read_timeout(Some(Duration::from_secs(1))).expect("a timeout");
+    let mut heard = Vec::new();
+    for text in ["command", "speed 37", "speed?"] {
+        socket.send(text.as_bytes()).expect("sent");
+        let until = Instant::now() + Duration::from_secs(1);
+        while Instant::now() < until {
+            let mut bytes = [0; 300];
+            let Ok(length) = socket.recv(&mut bytes) else { break };
+            heard.push(String::from_utf8_lossy(&bytes[..length]).into_owned());
+        }
+    }
+    assert_eq!(heard, ["ok", "ok", "37"]);
 }

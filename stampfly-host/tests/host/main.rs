@@ -48,6 +48,7 @@ mod report;
 mod rover;
 mod safety_mode;
 mod safety_sensors;
+mod same_number;
 mod set_points;
 mod stm32_quad;
 #[cfg(unix)]
