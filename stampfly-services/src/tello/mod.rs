@@ -34,6 +34,12 @@ const SILENCE: Duration = Duration::from_secs(15);
 const STATE: Duration = Duration::from_millis(100);
 /// Sticks that do not come again are centred after this long: a program sends them ten times a second at least.
 const STICKS: Duration = Duration::from_millis(500);
+/// For so long they are centred first: a pilot takes over who moves the sticks, and those that a
+/// program begins with never moved.
+const CENTRED: Duration = Duration::from_millis(100);
+/// A move that is asked for while sticks are out of their centre waits this long, until the program
+/// has the vehicle again: sticks end the route that they find.
+const LETS_GO: Duration = Duration::from_millis(100);
 /// Speed of moves without one of their own, m/s, as a Tello's.
 const SPEED: f32 = 0.5;
 
@@ -57,8 +63,11 @@ pub struct Tello<C> {
     connection: Connection,
     action: Option<Action>,
     speed: f32,
-    /// Sticks as they were last sent, and when.
+    /// Sticks as they were last sent, and when; and when the first of them were.
     sticks: Option<(Instant, PilotInput)>,
+    sticks_begun: Instant,
+    /// What is begun when the sticks are let go, and since when it waits.
+    waits: Option<(Instant, TelloCommand)>,
     next_state: Instant,
     /// Since when the motors are on, and how long they were when they went off.
     took_off: Option<Instant>,
@@ -85,6 +94,8 @@ impl<C> Tello<C> {
             action: None,
             speed: SPEED,
             sticks: None,
+            sticks_begun: Instant::ZERO,
+            waits: None,
             next_state: Instant::ZERO,
             took_off: None,
             in_air: Duration::ZERO,
@@ -139,6 +150,7 @@ impl<C: Copy + PartialEq> Tello<C> {
                 return say(TelloReply::Error("another program commands"));
             }
             if !is_program {
+                self.waits = None;
                 let before = self.seat();
                 cockpit.leave(&|seat| seat == before);
                 self.connection = cockpit.connection();
@@ -149,7 +161,7 @@ impl<C: Copy + PartialEq> Tello<C> {
         }
         // Motors off is everybody's.
         if command == TelloCommand::Emergency {
-            self.action = None;
+            (self.action, self.waits) = (None, None);
             let killed =
                 cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
             return say(if killed.is_ok() { TelloReply::Ok } else { TelloReply::Error("not taken") });
@@ -180,6 +192,7 @@ impl<C: Copy + PartialEq> Tello<C> {
                 let centred = input.roll == 0.0 && input.pitch == 0.0 && input.throttle == 0.0 && input.yaw == 0.0;
                 // Programs that do not fly by hand send centred sticks to be sure: they take nothing over.
                 if self.sticks.is_some() || !centred {
+                    self.sticks_begun = if self.sticks.is_some() { self.sticks_begun } else { now };
                     self.sticks = Some((now, input));
                 }
             }
@@ -190,12 +203,17 @@ impl<C: Copy + PartialEq> Tello<C> {
     /// Begins what takes its time.
     fn begin(&mut self, now: Instant, from: &C, command: TelloCommand, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
         let interrupts = matches!(command, TelloCommand::Stop | TelloCommand::Land);
-        if self.action.is_some() {
+        if self.action.is_some() || self.waits.is_some() {
             if !interrupts {
                 return send(from, &TelloReply::Error("busy"), put);
             }
-            self.action = None;
+            (self.action, self.waits) = (None, None);
             send(from, &TelloReply::Error("interrupted"), put);
+        }
+        if self.sticks.is_some() && !interrupts {
+            self.let_go(now, cockpit);
+            self.waits = Some((now, command));
+            return;
         }
         self.sticks = None;
         match Action::begin(now, self.seat(), command, self.speed, cockpit) {
@@ -213,13 +231,16 @@ impl<C: Copy + PartialEq> Tello<C> {
         let Some((program, heard)) = self.program else { return };
         if now.since(heard) >= SILENCE {
             // It may be there, and wait for what it has asked for.
-            if self.action.take().is_some() {
+            if self.action.take().is_some() || self.waits.take().is_some() {
                 send(&program, &TelloReply::Error("no command for 15 s"), put);
             }
             self.sticks = None;
             return;
         }
         cockpit.alive(now, self.seat());
+        if let Some((_, command)) = self.waits.take_if(|(since, _)| now.since(*since) >= LETS_GO) {
+            self.begin(now, &program, command, cockpit, put);
+        }
         let seat = self.seat();
         if let Some(action) = &mut self.action {
             let outcome = action.go_on(now, seat, cockpit);
@@ -255,6 +276,8 @@ impl<C: Copy + PartialEq> Tello<C> {
     fn fly_by_hand(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
         let Some((at, input)) = self.sticks else { return };
         if now.since(at) < STICKS {
+            let centred = PilotInput { mode: input.mode, ..PilotInput::default() };
+            let input = if now.since(self.sticks_begun) > CENTRED { input } else { centred };
             _ = cockpit.steer(now, self.seat(), &PilotInput { arm: cockpit.view().state().armed, ..input });
         } else {
             self.let_go(now, cockpit);

@@ -166,7 +166,7 @@ fn sticks_that_stop_coming_are_let_go() {
     talk.wait(5);
     assert_eq!(talk.vehicle.steered, [], "centred sticks take nothing over");
     talk.hear(1, "rc 10 -20 30 -40");
-    talk.wait(5);
+    talk.wait(8);
     let input = talk.vehicle.steered.last().expect("sticks");
     let sticks = [input.roll, input.pitch, input.throttle, input.yaw];
     assert!(
@@ -253,6 +253,53 @@ fn a_program_that_says_a_lot_in_one_moment_after_a_silence_is_not_taken_for_late
     }
     assert_eq!(talk.hear(1, "forward 100"), Vec::<String>::new());
     assert_eq!(talk.kinds(), [GuidedKind::Hold, GuidedKind::WayPoint]);
+}
+
+/// The mode machine gives a pilot the vehicle who moves the sticks away from where they were.
+#[test]
+fn sticks_are_centred_before_they_are_moved_so_that_they_take_over() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.hear(1, "command");
+    for _ in 0..2 {
+        talk.vehicle.steered.clear();
+        for _ in 0..10 {
+            talk.hear(1, "rc 0 60 0 0");
+            talk.wait(5);
+        }
+        let pitches: Vec<_> = talk.vehicle.steered.iter().map(|input| input.pitch).collect();
+        let (centred, moved) = pitches.split_at(5);
+        assert!(centred.iter().all(|pitch| *pitch == 0.0) && moved.iter().all(|pitch| *pitch > 0.59), "{pitches:?}");
+        assert!(moved.len() > 40);
+        // They stop, and begin again.
+        talk.wait(50);
+    }
+}
+
+#[test]
+fn a_move_behind_sticks_waits_until_they_are_let_go() {
+    let mut talk = Talk::new(Vehicle::flying());
+    talk.is_at(Vec3::new(0.0, 0.0, -0.5), 0.0);
+    talk.hear(1, "command");
+    for text in ["forward 50", "land"] {
+        for _ in 0..10 {
+            talk.hear(1, "rc 0 60 0 0");
+            talk.wait(5);
+        }
+        talk.vehicle.guided.clear();
+        assert_eq!(talk.hear(1, text), Vec::<String>::new());
+        let steered = talk.vehicle.steered.len();
+        if text == "land" {
+            assert_eq!(talk.kinds(), [GuidedKind::Land], "at once");
+        } else {
+            assert_eq!(talk.kinds(), [GuidedKind::Hold]);
+            assert_eq!(talk.hear(1, "cw 90"), ["error busy"]);
+            talk.wait(6);
+            assert_eq!(talk.kinds(), [GuidedKind::Hold, GuidedKind::Hold, GuidedKind::WayPoint]);
+            talk.is_at(Vec3::new(0.5, 0.0, -0.5), 0.0);
+            assert_eq!(talk.wait(20), ["ok"]);
+        }
+        assert_eq!(talk.vehicle.steered.len(), steered);
+    }
 }
 
 #[test]
