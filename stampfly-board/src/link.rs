@@ -2,12 +2,18 @@
 //!
 //! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames,
 //! others, where the configuration lets them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
+//!
+//! Who commands is the [`Helm`]'s decision, the same one that services ask: a station has a seat of its own, [`Seat::Link`], and the paired transmitter
+//! [`Seat::Transmitter`]. A station whose command or sticks are refused is told who commands, and a station in session is told what others ask of the vehicle.
 
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
+use core::fmt::{Display, Write as _};
+use heapless::String;
 use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
-use stampfly_types::messages::{Alerts, ArmBlocks, GuidedCommand, PilotInput};
+use stampfly_services::{Helm, Passed, Refusal, Seat, Told};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightStatus, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
@@ -17,12 +23,45 @@ pub const PERIOD: Duration = Duration::from_millis(20);
 const SENSOR_ERROR: Alerts =
     Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::TOF_LOST).with(Alerts::POWER_LOST);
 
+/// Stations whose seats are remembered: one that comes back is the same again.
+const STATIONS: usize = 4;
+/// Between two answers to sticks that are refused: they come fifty times a second.
+const STICKS_AGAIN: Duration = Duration::from_secs(2);
+/// How often a notice is said, because frames are lost, and how many turns lie between.
+const NOTICES: u8 = 3;
+const NOTICE_TURNS: u8 = 5;
+/// Characters of a refusal or notice: the longest names two numbers of 32 bits.
+const TEXT: usize = 96;
+
+/// Why a frame of the station was not obeyed.
+#[derive(Clone, Copy, Debug)]
+struct Refused {
+    counter: u32,
+    why: Refusal,
+}
+
+/// What the station is told of what others ask.
+#[derive(Clone, Copy, Debug, Default)]
+struct Notice {
+    /// The number of the newest one in the helm that was taken, and what it is.
+    number: u32,
+    told: Option<Told>,
+    /// How often it was said, and turns since then.
+    said: u8,
+    turns: u8,
+}
+
 /// The vehicle's end of the radio. `tests/board` has `pairing.rs`, `secured.rs` and `air.rs`.
 pub struct Link<'b> {
     /// Whom it listens to, and what it has refused.
     pub guarded: Guarded,
     pub(crate) ends: LinkEnds<'b>,
     counter: u8,
+    /// Where stations are, and their seats, the newest first.
+    stations: [Option<(Address, Seat)>; STATIONS],
+    refused: Option<Refused>,
+    sticks_refused: Option<Instant>,
+    notice: Notice,
 }
 
 /// What there may be to send.
@@ -32,7 +71,7 @@ pub enum Outgoing {
     Call,
     /// A part of the secure session's handshake, to everybody.
     Handshake,
-    /// What became of a command, or that it is not done while armed, to the station that sent it.
+    /// What became of a command, why it was refused, or that it is not done while armed, to the station that sent it.
     Acknowledgement,
     /// Telemetry, to who flies: sealed, by turns for a display and for a program.
     Telemetry,
@@ -47,25 +86,28 @@ impl<'b> Link<'b> {
     /// A link whose sessions are at their beginning.
     #[must_use]
     pub const fn new(guarded: Guarded, ends: LinkEnds<'b>) -> Self {
-        Self { guarded, ends, counter: 0 }
+        let (stations, notice) = ([None; STATIONS], Notice { number: 0, told: None, said: 0, turns: 0 });
+        Self { guarded, ends, counter: 0, stations, refused: None, sticks_refused: None, notice }
     }
 
-    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands. What else a station with the key has sent is returned,
-    /// for a `RadioDesk` of `stampfly-services`, whose answers `guarded` seals.
+    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands as far as the helm lets them through. What else a station with the
+    /// key has sent is returned, for a `RadioDesk` of `stampfly-services`, whose answers `guarded` seals.
     ///
     /// # Errors
     /// When it is refused. The session has counted it; nothing is published.
     pub fn receive<'f>(
         &mut self,
+        helm: &mut Helm,
         at: Instant,
         source: Address,
         bytes: &'f mut [u8],
     ) -> Result<Option<Received<'f>>, NotTaken> {
         let before = self.guarded.session().peer();
         match self.guarded.receive(at, source, bytes)? {
-            Heard::Authentic(received) => Ok(self.obey(at, received)),
+            Heard::Authentic(received) => Ok(self.obey(helm, at, source, received)),
             Heard::Unauthenticated(input) => {
-                self.ends.command_pilot.publish(at, &input);
+                // It has no ear for an answer.
+                _ = self.steer(helm, at, Seat::Transmitter, &input);
                 if let Some(peer) = self.guarded.session().peer().filter(|peer| Some(*peer) != before) {
                     self.ends.link_peer.publish(at, &peer.into());
                 }
@@ -75,16 +117,130 @@ impl<'b> Link<'b> {
         }
     }
 
-    /// Publishes what a station with the key has sent, whichever way it came, and returns what is no command.
-    pub fn obey<'f>(&mut self, at: Instant, received: Received<'f>) -> Option<Received<'f>> {
+    /// The same for what has come over a network, where there is nothing but sealed frames.
+    ///
+    /// # Errors
+    /// When it is none of a station with the key.
+    pub fn receive_sealed<'f>(
+        &mut self,
+        helm: &mut Helm,
+        at: Instant,
+        source: Address,
+        frame: &'f mut [u8],
+    ) -> Result<Option<Received<'f>>, NotTaken> {
+        match self.guarded.receive_sealed(at, source, frame)? {
+            Heard::Authentic(received) => Ok(self.obey(helm, at, source, received)),
+            Heard::Unauthenticated(_) | Heard::Handshake => Ok(None),
+        }
+    }
+
+    /// Publishes what a station with the key has sent, if the helm lets it through, and returns what is no command.
+    fn obey<'f>(
+        &mut self,
+        helm: &mut Helm,
+        at: Instant,
+        source: Address,
+        received: Received<'f>,
+    ) -> Option<Received<'f>> {
+        let seat = self.seat(helm, source);
+        let counter = match received.payload {
+            Payload::Numbered { number, .. } => number,
+            _ => received.counter,
+        };
         if let Payload::Sticks(input) = received.payload {
-            self.sticks(at, &input);
+            let is_due = self.sticks_refused.is_none_or(|last| at.since(last) >= STICKS_AGAIN);
+            match self.steer(helm, at, seat, &input) {
+                // What is said once of a command is not overwritten.
+                Err(why) if is_due && self.refused.is_none() => {
+                    (self.sticks_refused, self.refused) = (Some(at), Some(Refused { counter, why }));
+                }
+                Err(_) => {}
+                Ok(()) => self.sticks_refused = None,
+            }
             return None;
         }
         let Some(command) = received.payload.command() else { return Some(received) };
-        let taken = self.command(at, command);
-        self.guarded.acknowledge(&received, taken);
+        let taken = match command.kind {
+            // A sign of life, which takes nothing over. The commander's is passed on as it comes.
+            GuidedKind::None => Ok(helm.alive(at, seat) && self.command(at, command)),
+            _ => helm.guide(at, seat, command, &mut |passed| self.pass(at, passed)).map(|()| true),
+        };
+        match taken {
+            Ok(taken) => self.guarded.acknowledge(&received, taken),
+            // It is said again: there may be room then.
+            Err(Refusal::Full) => self.guarded.acknowledge(&received, false),
+            Err(why) => self.refused = Some(Refused { counter, why }),
+        }
         None
+    }
+
+    /// Follows the vehicle's state, and passes the commander's signs of life on, whoever it is. The firmware's radio calls it every 20 ms, beside the console's
+    /// services, which may have to wait.
+    pub fn keep(&mut self, helm: &mut Helm, now: Instant) {
+        let armed = self.status().armed;
+        helm.keep(now, armed, &mut |passed| self.pass(now, passed));
+    }
+
+    /// The seat of a station that is there.
+    fn seat(&mut self, helm: &mut Helm, source: Address) -> Seat {
+        let known = self.stations.iter().flatten().find(|(station, _)| *station == source);
+        if let Some((_, seat)) = known {
+            return *seat;
+        }
+        let seat = Seat::Link(helm.connection());
+        self.stations.rotate_right(1);
+        let [newest, ..] = &mut self.stations;
+        *newest = Some((source, seat));
+        seat
+    }
+
+    fn steer(&mut self, helm: &mut Helm, at: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
+        let status = self.status();
+        helm.steer(at, seat, input, &status, &mut |passed| self.pass(at, passed))
+    }
+
+    fn pass(&mut self, at: Instant, passed: Passed) -> Result<(), Refusal> {
+        match passed {
+            Passed::Command(command) if self.command(at, command) => Ok(()),
+            Passed::Command(_) => Err(Refusal::Full),
+            Passed::Sticks(input) => {
+                self.sticks(at, &input);
+                Ok(())
+            }
+        }
+    }
+
+    fn status(&mut self) -> FlightStatus {
+        self.ends.flight_status.latest().map(|sample| sample.data).unwrap_or_default()
+    }
+
+    /// Seals what the station is to be told of what was asked of the vehicle, and by whom. Ask every 20 ms or so.
+    pub fn notice<'r>(
+        &mut self,
+        helm: &Helm,
+        now: Instant,
+        room: &'r mut [u8; MAX_FRAME],
+    ) -> Option<(Address, &'r [u8])> {
+        let notice = &mut self.notice;
+        notice.turns = notice.turns.saturating_add(1);
+        let is_over = notice.said >= NOTICES || notice.told.is_none();
+        if let Some((number, told)) = helm.told(notice.number).filter(|_| is_over || notice.said > 0) {
+            // What is new goes before what is said again.
+            *notice = Notice { number, told: Some(told), said: 0, turns: NOTICE_TURNS };
+        }
+        if notice.said >= NOTICES || notice.turns < NOTICE_TURNS {
+            return None;
+        }
+        let text = text(&notice.told?);
+        (notice.said, notice.turns) = (notice.said + 1, 0);
+        let notice = Payload::Notice { number: notice.number, text: &text };
+        self.guarded.seal(now, &notice, room)
+    }
+
+    /// Seals why a frame of the station was refused, once.
+    fn refusal<'r>(&mut self, now: Instant, room: &'r mut [u8; MAX_FRAME]) -> Option<(Address, &'r [u8])> {
+        let Refused { counter, why } = self.refused.take()?;
+        self.guarded.seal(now, &Payload::Refusal { counter, why: &text(&why) }, room)
     }
 
     /// Publishes a command, of a station with the key or of a service. Was there room for it?
@@ -107,11 +263,12 @@ impl<'b> Link<'b> {
     ) -> Option<(Address, &'r [u8])> {
         match what {
             Outgoing::Call => {
-                let mode = self.ends.flight_status.latest().map(|sample| sample.data).unwrap_or_default();
+                let mode = self.status();
                 self.guarded.follow(now, mode.armed, mode.pairing);
                 Some((Address::BROADCAST, put(room, &self.guarded.beacon(now)?)?))
             }
             Outgoing::Handshake => Some((Address::BROADCAST, self.guarded.transmit(now, random, room)?)),
+            Outgoing::Acknowledgement if self.refused.is_some() => self.refusal(now, room),
             Outgoing::Acknowledgement => self.guarded.seal_acknowledgement(now, room),
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
@@ -128,6 +285,14 @@ impl<'b> Link<'b> {
             }
         }
     }
+}
+
+/// A text for people, as far as there is room for it.
+fn text(what: &dyn Display) -> String<TEXT> {
+    let mut text = String::new();
+    // What is too long is cut.
+    _ = write!(text, "{what}");
+    text
 }
 
 fn packet(counter: u8, frame: &TelemetryFrame) -> TelemetryPacket {

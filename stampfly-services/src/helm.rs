@@ -3,15 +3,17 @@
 //!
 //! A vehicle implements [`Hands`]: how its commands and sticks are published, where its parameters
 //! are, what its board does. [`Seated`] is its cockpit for one call of a service, in firmware and
-//! in simulation alike.
+//! in simulation alike. What comes by radio has no service: the vehicle's end of the radio asks the
+//! [`Helm`] itself, with [`Helm::guide`], [`Helm::steer`] and [`Helm::alive`].
 
 use crate::cockpit::{Cockpit, Request, fly_to};
 use crate::lease::Lease;
 use crate::refusal::{Connection, Refusal, Seat};
+use crate::stick_source::{StickSource, Verdict};
 use crate::view::View;
 use core::fmt;
 use stampfly_flight::parameters::Parameters;
-use stampfly_types::messages::{CalibrationKind, GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::messages::{CalibrationKind, FlightStatus, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant, Origin};
 
 /// The same command of the same program is told once in this time: some say it ten times a second.
@@ -72,6 +74,8 @@ pub enum Asked {
     Sticks,
     /// Nothing more: it is gone, and had the lease.
     Left,
+    /// Nothing more: it was not heard for three seconds, and had the lease.
+    Silent,
 }
 
 impl fmt::Display for Told {
@@ -81,6 +85,7 @@ impl fmt::Display for Told {
             Asked::Command(kind) => write!(f, "{seat}: {}", word(*kind)),
             Asked::Sticks => write!(f, "{seat}: flies by hand"),
             Asked::Left => write!(f, "{seat} is gone, none commands"),
+            Asked::Silent => write!(f, "{seat} is silent, none commands"),
         }
     }
 }
@@ -100,10 +105,25 @@ const fn word(kind: GuidedKind) -> &'static str {
     }
 }
 
+/// What the helm passes on to the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Passed {
+    /// A command.
+    Command(GuidedCommand),
+    /// Sticks.
+    Sticks(PilotInput),
+}
+
+/// Where it goes. It says when there is no room.
+pub type Pass<'p> = &'p mut dyn FnMut(Passed) -> Result<(), Refusal>;
+
 /// Who commands, and what everybody is told of it.
 #[derive(Clone, Debug, Default)]
 pub struct Helm {
     lease: Lease,
+    sticks: StickSource,
+    /// Who has the lease and was heard, when it was looked last.
+    heard: Option<Seat>,
     /// Connections that have come.
     connections: Connection,
     tells: [Option<Told>; TELLS],
@@ -117,7 +137,15 @@ impl Helm {
     /// No program commands.
     #[must_use]
     pub const fn new() -> Self {
-        Self { lease: Lease::new(), connections: 0, tells: [None; TELLS], told: 0, asked: Instant::ZERO }
+        Self {
+            lease: Lease::new(),
+            sticks: StickSource::new(),
+            heard: None,
+            connections: 0,
+            tells: [None; TELLS],
+            told: 0,
+            asked: Instant::ZERO,
+        }
     }
 
     /// Who commands.
@@ -129,14 +157,95 @@ impl Helm {
     /// What is to be done now and then, whichever programs are connected: call it at least every
     /// 100 ms.
     pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {
+        self.keep(now, armed, &mut |passed| pass(hands, now, passed));
+        hands.poll(now, armed);
+    }
+
+    /// The part of [`poll`](Self::poll) that needs no hands: the lease ends with the flight, and the
+    /// commander's signs of life are passed on.
+    pub fn keep(&mut self, now: Instant, armed: bool, pass: Pass<'_>) {
+        self.follow(now, armed);
+        if self.lease.is_sign_due(now) {
+            // A vehicle whose queue is full hears enough.
+            _ = pass(Passed::Command(GuidedCommand::default()));
+        }
+    }
+
+    fn follow(&mut self, now: Instant, armed: bool) {
         if !armed {
             self.lease.release();
         }
-        if self.lease.is_sign_due(now) {
-            // A vehicle whose queue is full hears enough.
-            _ = hands.command(now, GuidedCommand::default());
+        let holder = self.lease.holder(now);
+        let before = core::mem::replace(&mut self.heard, holder);
+        // Not a seat that has left, or whose flight is over.
+        if holder.is_none()
+            && let Some(seat) = self.lease.commander().filter(|seat| before == Some(*seat))
+        {
+            self.tell(now, Told { seat, what: Asked::Silent });
         }
-        hands.poll(now, armed);
+    }
+
+    /// A number for a connection that has come.
+    pub const fn connection(&mut self) -> Connection {
+        self.connections = self.connections.wrapping_add(1);
+        self.connections
+    }
+
+    /// A command: is passed on, if this seat may give it.
+    ///
+    /// # Errors
+    /// When it may not, a number is none, or there is no room.
+    pub fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand, pass: Pass<'_>) -> Result<(), Refusal> {
+        self.lease.ask(now, seat, &command)?;
+        pass(Passed::Command(command))?;
+        if command.kind != GuidedKind::None {
+            self.tell(now, Told { seat, what: Asked::Command(command.kind) });
+        }
+        Ok(())
+    }
+
+    /// A frame of sticks for a vehicle in this state: is passed on, if this seat may fly it by hand.
+    ///
+    /// # Errors
+    /// When another may, or there is no room. A kill is passed on from every seat, and so is an arm
+    /// switch that is turned off, as a command to land.
+    pub fn steer(
+        &mut self,
+        now: Instant,
+        seat: Seat,
+        input: &PilotInput,
+        status: &FlightStatus,
+        pass: Pass<'_>,
+    ) -> Result<(), Refusal> {
+        let verdict = self.sticks.judge(now, seat, input, status, &mut self.lease);
+        if input.kill {
+            pass(Passed::Sticks(input.cleaned()))?;
+            if status.armed {
+                self.tell(now, Told { seat, what: Asked::Command(GuidedKind::Kill) });
+            }
+            return Ok(());
+        }
+        match verdict {
+            Verdict::Flies | Verdict::Passes => {
+                pass(Passed::Sticks(input.cleaned()))?;
+                if verdict == Verdict::Flies {
+                    self.tell(now, Told { seat, what: Asked::Sticks });
+                }
+                Ok(())
+            }
+            Verdict::Lands(holder) => {
+                let land = GuidedCommand { kind: GuidedKind::Land, ..GuidedCommand::default() };
+                self.guide(now, seat, land, pass)?;
+                Err(Refusal::Occupied(holder))
+            }
+            Verdict::Refused(holder) => Err(Refusal::Occupied(holder)),
+        }
+    }
+
+    /// A sign of life. Does it count?
+    pub fn alive(&mut self, now: Instant, seat: Seat) -> bool {
+        self.lease.alive(now, seat);
+        self.lease.is_holders(seat)
     }
 
     fn tell(&mut self, now: Instant, told: Told) {
@@ -151,8 +260,10 @@ impl Helm {
         }
     }
 
-    /// What comes after this number. What a service has not looked at for too long is gone.
-    fn told(&self, after: u32) -> Option<(u32, Told)> {
+    /// What was asked of the vehicle after this number, and by whom. What a service has not looked at
+    /// for too long is gone.
+    #[must_use]
+    pub fn told(&self, after: u32) -> Option<(u32, Told)> {
         let waiting = self.told.wrapping_sub(after);
         if waiting == 0 {
             return None;
@@ -160,6 +271,13 @@ impl Helm {
         let place = if waiting as usize > TELLS { self.told.wrapping_sub(TELLS as u32) } else { after };
         let told = self.tells.get(place as usize % TELLS).copied().flatten()?;
         Some((place.wrapping_add(1), told))
+    }
+}
+
+fn pass(hands: &mut dyn Hands, now: Instant, passed: Passed) -> Result<(), Refusal> {
+    match passed {
+        Passed::Command(command) => hands.command(now, command),
+        Passed::Sticks(input) => hands.sticks(now, &input),
     }
 }
 
@@ -179,8 +297,7 @@ impl Cockpit for Seated<'_> {
     }
 
     fn connection(&mut self) -> Connection {
-        self.helm.connections = self.helm.connections.wrapping_add(1);
-        self.helm.connections
+        self.helm.connection()
     }
 
     fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
@@ -197,12 +314,8 @@ impl Cockpit for Seated<'_> {
     }
 
     fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal> {
-        self.helm.lease.ask(now, seat, &command)?;
-        self.hands.command(now, command)?;
-        if command.kind != GuidedKind::None {
-            self.helm.tell(now, Told { seat, what: Asked::Command(command.kind) });
-        }
-        Ok(())
+        let Self { helm, hands, .. } = self;
+        helm.guide(now, seat, command, &mut |passed| pass(*hands, now, passed))
     }
 
     fn fly_to(&mut self, now: Instant, seat: Seat, way_point: GuidedCommand) -> Result<(), Refusal> {
@@ -213,20 +326,12 @@ impl Cockpit for Seated<'_> {
     }
 
     fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
-        // A kill is everybody's.
-        if !input.kill {
-            self.helm.lease.steer(now, seat)?;
-        }
-        self.hands.sticks(now, &input.cleaned())?;
-        if self.view.state().armed {
-            let what = if input.kill { Asked::Command(GuidedKind::Kill) } else { Asked::Sticks };
-            self.helm.tell(now, Told { seat, what });
-        }
-        Ok(())
+        let Self { helm, hands, view } = self;
+        helm.steer(now, seat, input, &view.state(), &mut |passed| pass(*hands, now, passed))
     }
 
     fn alive(&mut self, now: Instant, seat: Seat) {
-        self.helm.lease.alive(now, seat);
+        self.helm.alive(now, seat);
     }
 
     fn parameters(&mut self) -> &mut dyn Parameters {

@@ -4,9 +4,9 @@
 //! asks for anything has the lease as long as it is heard; the others are told who has it. A kill
 //! is everybody's at any time, and so is landing. When the holder falls silent or its connection
 //! ends, the vehicle's own failsafe acts, and another program may take the lease with a command.
-//! Sticks of a program obey the same rule, but do not take the lease of a flight: some are sent as
-//! long as a page is open. A transmitter's sticks do not come here: what they do is the mode
-//! machine's decision (`stampfly-mode`), and they win.
+//! Sticks of a program or of a station with the key obey the same rule, but do not take the lease of
+//! a flight: some are sent as long as a page is open. Whose sticks reach the vehicle is decided in
+//! `stick_source.rs`.
 
 use crate::refusal::{Refusal, Seat};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
@@ -74,6 +74,11 @@ impl Lease {
         self.holder.filter(|_| !self.has_left)
     }
 
+    /// Who has taken the lease of this flight, heard or not, there or not.
+    pub(crate) const fn taker(&self) -> Option<Seat> {
+        self.holder
+    }
+
     /// Do this one's signs of life count?
     #[must_use]
     pub fn is_holders(&self, seat: Seat) -> bool {
@@ -117,6 +122,11 @@ impl Lease {
         }
     }
 
+    /// It commands from now on, whoever did before: the mode machine has let it take over.
+    pub fn take(&mut self, now: Instant, seat: Seat) {
+        (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
+    }
+
     /// Its connection has ended. Another may take the lease at once; until one does, the vehicle's
     /// failsafe hears nothing.
     pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
@@ -140,7 +150,9 @@ impl Lease {
 
     /// Must a sign of life be passed on to the vehicle now? Ask at least every [`LIFE`].
     pub fn is_sign_due(&mut self, now: Instant) -> bool {
-        let due = self.is_heard(now) && self.passed.is_none_or(|passed| now.since(passed) >= LIFE);
+        // A transmitter's frames are what the failsafe hears of it.
+        let is_there = self.is_heard(now) && self.holder != Some(Seat::Transmitter);
+        let due = is_there && self.passed.is_none_or(|passed| now.since(passed) >= LIFE);
         if due {
             self.passed = Some(now);
         }
@@ -167,7 +179,8 @@ mod tests {
 
     #[test]
     fn a_watcher_does_not_keep_the_lease_of_a_silent_commander() {
-        for watcher in [TWO, Seat::Mavlink { connection: 1, system: 255, component: 191 }, Seat::Page(1), Seat::Link] {
+        for watcher in [TWO, Seat::Mavlink { connection: 1, system: 255, component: 191 }, Seat::Page(1), Seat::Link(1)]
+        {
             let mut lease = Lease::new();
             assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
             for ms in (0..3_000).step_by(500) {

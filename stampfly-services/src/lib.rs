@@ -10,7 +10,7 @@
 //! | [`Requested`] | parameters of a vehicle that takes requests for them |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`watches`] | the topics that a station wants to see, and when each is due |
-//! | [`lease`] | one program at a time commands; whoever flies by hand comes first |
+//! | [`lease`] | one seat at a time commands: a page, a program, a station with the key, a transmitter |
 //! | [`mission`] | steps that a vehicle flies one after the other |
 //! | [`tape`] | who is sent the flight record |
 //! | [`telemetry`] | a packet for whoever listens, fifty times a second |
@@ -47,6 +47,7 @@ pub mod network;
 pub mod radio_desk;
 mod refusal;
 mod requested;
+mod stick_source;
 pub mod tape;
 pub mod telemetry;
 pub mod tello;
@@ -57,7 +58,7 @@ pub mod watches;
 pub use cockpit::{Cockpit, Request};
 pub use data_stream::DataStream;
 pub use desk::Desk;
-pub use helm::{Asked, Hands, Helm, Seated, Told};
+pub use helm::{Asked, Hands, Helm, Pass, Passed, Seated, Told};
 pub use lease::Lease;
 pub use radio_desk::RadioDesk;
 pub use refusal::{Connection, Refusal, Seat};

@@ -27,8 +27,11 @@ pub enum Seat {
     Tello(Connection),
     /// A person at the console.
     Console,
-    /// A station on a secured link.
-    Link,
+    /// A station on a secured link, by its connection: where its frames come from. Another station
+    /// with the same key is another.
+    Link(Connection),
+    /// The transmitter that the vehicle is paired with, whose packets authenticate nobody.
+    Transmitter,
 }
 
 impl Seat {
@@ -48,7 +51,8 @@ impl fmt::Display for Seat {
             }
             Self::Tello(connection) => write!(f, "a Tello program, line {connection}"),
             Self::Console => f.write_str("the console"),
-            Self::Link => f.write_str("the station with the key"),
+            Self::Link(connection) => write!(f, "the station with the key, line {connection}"),
+            Self::Transmitter => f.write_str("the transmitter"),
         }
     }
 }

@@ -201,6 +201,11 @@ impl<H: Hands> Ground<H> {
         Seated { helm, hands, view: View::new(samples, places) }
     }
 
+    /// Who commands, and the vehicle's hands: for what comes to the vehicle by its own radio, and asks the helm itself.
+    pub const fn helm(&mut self) -> (&mut Helm, &mut H) {
+        (&mut self.helm, &mut self.hands)
+    }
+
     /// Something was heard at one of the ports that are the same for every vehicle. Nothing happens at another.
     pub fn hear(
         &mut self,

@@ -62,8 +62,8 @@ use stampfly_drivers::Timebase;
 use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, Policy};
-use stampfly_services::RadioDesk;
 use stampfly_services::cable::fingerprint;
+use stampfly_services::{Helm, RadioDesk};
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -200,10 +200,13 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
         static DESK: StaticCell<RefCell<RadioDesk>> = StaticCell::new();
         let tables = fingerprint(&topics::TOPICS, &config);
         let desk: &'static _ = DESK.init_with(|| RefCell::new(RadioDesk::new(tables)));
+        static HELM: StaticCell<RefCell<Helm>> = StaticCell::new();
+        let helm: &'static _ = HELM.init_with(|| RefCell::new(Helm::new()));
         let link = radio::link(peer, key.clone(), policy, outside.link);
         let radio = Box::new(radio::Parts {
             unit: chip.WIFI,
             link,
+            helm,
             desk,
             taken,
             memory,
@@ -222,6 +225,7 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             facts: facts::Facts::read(unusable),
             key,
             link,
+            helm,
             desk,
             taken,
             #[cfg(feature = "wifi")]

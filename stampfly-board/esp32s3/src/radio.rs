@@ -34,6 +34,7 @@ use stampfly_board::topics;
 use stampfly_drivers::Timebase;
 use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
+use stampfly_services::Helm;
 use stampfly_services::desk::Post;
 use stampfly_services::radio_desk::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioDesk, Words};
 use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
@@ -46,6 +47,8 @@ pub static MADE: Signal<CriticalSectionRawMutex, Key> = Signal::new();
 pub struct Parts {
     pub unit: WIFI<'static>,
     pub link: &'static RefCell<Link<'static>>,
+    /// Who commands, by radio and at the console's services alike.
+    pub helm: &'static RefCell<Helm>,
     /// What a station with the key asks besides flying.
     pub desk: &'static RefCell<RadioDesk>,
     /// The flight record.
@@ -81,6 +84,7 @@ pub async fn run(parts: Box<Parts>) {
     let Parts {
         unit,
         link,
+        helm,
         desk,
         taken,
         memory,
@@ -100,7 +104,7 @@ pub async fn run(parts: Box<Parts>) {
     {
         link.borrow_mut().guarded.set_vehicle(Vehicle::new(key));
     }
-    let waiting = Waiting { taken, desk, memory };
+    let waiting = Waiting { helm, taken, desk, memory };
     #[cfg(feature = "wifi")]
     {
         let mut seed = [0; 8];
@@ -108,11 +112,11 @@ pub async fn run(parts: Box<Parts>) {
         let air = wifi::start(network, u64::from_le_bytes(seed));
         let say = Say { sender, manager: &manager, network };
         let in_the_network =
-            join(wifi::carry(air, network, link, desk), wifi::associate(controller, &manager, network, memory));
-        join3(receive(receiver, link, desk), send(say, &random, link, waiting), in_the_network).await;
+            join(wifi::carry(air, network, (link, helm), desk), wifi::associate(controller, &manager, network, memory));
+        join3(receive(receiver, link, helm, desk), send(say, &random, link, waiting), in_the_network).await;
     }
     #[cfg(not(feature = "wifi"))]
-    join(receive(receiver, link, desk), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
+    join(receive(receiver, link, helm, desk), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
 }
 
 /// A new key, which is also handed on to be stored.
@@ -124,7 +128,12 @@ fn make(random: &Trng) -> Option<Key> {
     Some(key)
 }
 
-async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &RefCell<RadioDesk>) {
+async fn receive(
+    mut receiver: EspNowReceiver,
+    link: &RefCell<Link<'_>>,
+    helm: &RefCell<Helm>,
+    desk: &RefCell<RadioDesk>,
+) {
     let mut room = [0; MAX_FRAME];
     loop {
         let received = receiver.receive_async().await;
@@ -133,7 +142,7 @@ async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &
         if let Some(frame) = room.get_mut(..received.data().len()) {
             frame.copy_from_slice(received.data());
             let now = Clock.now();
-            if let Ok(Some(received)) = link.borrow_mut().receive(now, source, frame) {
+            if let Ok(Some(received)) = link.borrow_mut().receive(&mut helm.borrow_mut(), now, source, frame) {
                 // A station asks again for what there is no room for.
                 let _ = desk.borrow_mut().ask(now, &received.payload);
             }
@@ -143,6 +152,7 @@ async fn receive(mut receiver: EspNowReceiver, link: &RefCell<Link<'_>>, desk: &
 
 /// Where there may be something for a station that has asked for it.
 struct Waiting {
+    helm: &'static RefCell<Helm>,
     taken: &'static RefCell<Taken>,
     desk: &'static RefCell<RadioDesk>,
     memory: &'static RefCell<Memory>,
@@ -173,6 +183,11 @@ async fn send(mut say: Say<'_>, random: &Trng, link: &RefCell<Link<'_>>, waiting
             if let Some((to, bytes)) = outgoing {
                 let _ = say.say(to, bytes).await;
             }
+        }
+        link.borrow_mut().keep(&mut waiting.helm.borrow_mut(), Clock.now());
+        let notice = link.borrow_mut().notice(&waiting.helm.borrow(), Clock.now(), &mut room);
+        if let Some((to, bytes)) = notice {
+            let _ = say.say(to, bytes).await;
         }
         for _ in 0..POST_AT_ONCE {
             let Ok(post) = POST.try_receive() else { break };

@@ -22,10 +22,10 @@ use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
 use stampfly_board::link::Link;
 use stampfly_drivers::Timebase;
 use stampfly_link::Address;
-use stampfly_link::secure::{Heard, MAX_FRAME};
-use stampfly_services::RadioDesk;
+use stampfly_link::secure::MAX_FRAME;
 use stampfly_services::association::{Association, Credentials, Event, State, Step};
 use stampfly_services::network::{self, Door, Routes, Stack};
+use stampfly_services::{Helm, RadioDesk};
 use stampfly_types::Instant;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -169,6 +169,7 @@ impl Device for Air {
 /// The radio's link and desk, as the network sees them.
 struct Behind {
     link: &'static RefCell<Link<'static>>,
+    helm: &'static RefCell<Helm>,
     desk: &'static RefCell<RadioDesk>,
 }
 
@@ -178,10 +179,8 @@ impl Door for Behind {
     }
 
     fn take(&mut self, now: Instant, source: Address, frame: &mut [u8]) {
-        let mut link = self.link.borrow_mut();
-        if let Ok(Heard::Authentic(received)) = link.guarded.receive_sealed(now, source, frame)
-            && let Some(received) = link.obey(now, received)
-        {
+        let (mut link, mut helm) = (self.link.borrow_mut(), self.helm.borrow_mut());
+        if let Ok(Some(received)) = link.receive_sealed(&mut helm, now, source, frame) {
             // A station asks again for what there is no room for.
             let _ = self.desk.borrow_mut().ask(now, &received.payload);
         }
@@ -207,11 +206,11 @@ pub fn start(network: &RefCell<Network>, seed: u64) -> Air {
 pub async fn carry(
     mut air: Air,
     network: &RefCell<Network>,
-    link: &'static RefCell<Link<'static>>,
+    (link, helm): (&'static RefCell<Link<'static>>, &'static RefCell<Helm>),
     desk: &'static RefCell<RadioDesk>,
 ) {
     let mut ticker = Ticker::every(TURN);
-    let mut door = Behind { link, desk };
+    let mut door = Behind { link, helm, desk };
     loop {
         ticker.next().await;
         turn(&mut air, &mut network.borrow_mut(), &mut door);

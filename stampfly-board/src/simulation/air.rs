@@ -15,7 +15,7 @@ use stampfly_link::secure::{
 };
 use stampfly_link::{Address, ControlPacket, Session};
 use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
-use stampfly_services::{Desk, Tape};
+use stampfly_services::{Desk, Helm, Tape};
 use stampfly_sim::Noise;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::PilotInput;
@@ -78,6 +78,8 @@ pub struct AirReport {
 /// Both ends, and what is between them.
 pub(super) struct Ends<'b> {
     link: Link<'b>,
+    /// One station and a stranger: no program is at any port.
+    helm: Helm,
     station: Station,
     noise: Noise,
     /// The newest of the station's frames, which a stranger has recorded.
@@ -111,6 +113,7 @@ impl<'b> Ends<'b> {
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
         Ok(Self {
             link: Link::new(Guarded::new(Vehicle::new(key.clone()), session, policy), ends),
+            helm: Helm::new(),
             station: Station::new(key),
             noise,
             recorded: Vec::new(),
@@ -255,7 +258,7 @@ impl<'b> Ends<'b> {
         if self.tick.0 != tick {
             self.tick = (tick, self.tally().tag);
         }
-        let heard = self.link.receive(now, TRANSMITTER, bytes).map(|received| {
+        let heard = self.link.receive(&mut self.helm, now, TRANSMITTER, bytes).map(|received| {
             received.map(|received| self.desk.ask(0, &received.payload));
         });
         self.report.worst_tags = self.report.worst_tags.max(self.tally().tag - self.tick.1);

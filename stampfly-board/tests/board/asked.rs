@@ -68,7 +68,7 @@ impl<'b> Air<'b> {
     }
 
     fn arrive(&mut self, mut frame: Vec<u8>) {
-        if let Ok(Some(received)) = self.bench.link.receive(self.bench.now, STATION, &mut frame) {
+        if let Ok(Some(received)) = self.bench.link.receive(&mut self.bench.helm, self.bench.now, STATION, &mut frame) {
             assert!(self.desk.ask(0, &received.payload), "{:?}", received.payload);
         }
     }
@@ -202,7 +202,7 @@ fn without_the_key_nothing_is_answered_and_every_frame_is_counted() {
     for bit in 0..8 {
         let mut forged = sealed.clone();
         *forged.last_mut().expect("a tag") ^= 1 << bit;
-        let heard = air.bench.link.receive(air.bench.now, STATION, &mut forged).map(drop);
+        let heard = air.bench.link.receive(&mut air.bench.helm, air.bench.now, STATION, &mut forged).map(drop);
         assert_eq!(heard, Err(NotTaken::Secure(Refused::Tag)));
         air.bench.pass(5, false, &[]);
     }

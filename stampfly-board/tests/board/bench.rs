@@ -10,6 +10,7 @@ use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::secure::{Guarded, MAX_FRAME, NotTaken, Policy, Vehicle};
 use stampfly_link::{Address, ControlPacket, Session};
+use stampfly_services::Helm;
 use stampfly_types::messages::{
     ArmBlocks, BaroData, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput,
     PowerData, TofData,
@@ -39,6 +40,8 @@ pub struct Bench<'b> {
     flight: FlightLoop<'b, Runnables>,
     pub ends: Ends<'b>,
     pub link: Link<'b>,
+    /// Who commands, as the firmware has it.
+    pub helm: Helm,
     randoms: u64,
     /// What the vehicle has sent.
     pub said: Vec<Vec<u8>>,
@@ -75,6 +78,7 @@ impl<'b> Bench<'b> {
             flight,
             ends,
             link,
+            helm: Helm::new(),
             randoms: 0,
             said: Vec::new(),
             taps,
@@ -150,7 +154,7 @@ impl<'b> Bench<'b> {
                 for (source, arm) in air {
                     let sticks = PilotInput { arm: *arm, ..Default::default() };
                     let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
-                    last = Some(self.link.receive(now, *source, &mut bytes).map(drop));
+                    last = Some(self.link.receive(&mut self.helm, now, *source, &mut bytes).map(drop));
                 }
                 for what in Outgoing::ALL {
                     let said = self.say(now, what);

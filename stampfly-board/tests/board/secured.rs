@@ -2,10 +2,13 @@
 
 use crate::bench::{Bench, OLD};
 use stampfly_board::link::Outgoing;
-use stampfly_board::topics;
+use stampfly_board::topics::{self, Id};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, NotTaken, Payload, Refused, Station, Vehicle};
-use stampfly_types::messages::{GuidedCommand, GuidedKind, PilotInput};
+use stampfly_services::{Refusal, Seat};
+use stampfly_types::messages::{
+    Alerts, CommandSource, FlightStatus, GuidedCommand, GuidedKind, PilotInput, SystemAlert,
+};
 
 const STATION: Address = Address([2, 0, 0, 0, 0, 9]);
 
@@ -25,7 +28,7 @@ fn talk(bench: &mut Bench<'_>, station: &mut Station, armed: bool) -> u32 {
         }
         let mut room = [0; MAX_FRAME];
         if let Some(frame) = station.transmit(bench.now, [turn + 1; 8], &mut room).map(<[u8]>::to_vec) {
-            let _ = bench.link.receive(bench.now, STATION, &mut frame.clone());
+            let _ = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone());
         }
     }
     acknowledged
@@ -33,7 +36,7 @@ fn talk(bench: &mut Bench<'_>, station: &mut Station, armed: bool) -> u32 {
 
 fn say(bench: &mut Bench<'_>, station: &mut Station, payload: &Payload<'_>) -> Vec<u8> {
     let frame = station.seal(bench.now, payload, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
-    assert_eq!(bench.link.receive(bench.now, STATION, &mut frame.clone()), Ok(None), "{payload:?}");
+    assert_eq!(bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone()), Ok(None), "{payload:?}");
     frame
 }
 
@@ -57,7 +60,7 @@ fn every_form_of_a_kill_stops_the_motors_and_commands_are_acknowledged() {
         let frame = say(&mut bench, &mut station, &kill);
         bench.pass(5, false, &[]);
         assert!(!bench.armed(), "{kill:?}");
-        let again = bench.link.receive(bench.now, STATION, &mut frame.clone()).map(drop);
+        let again = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone()).map(drop);
         assert_eq!(again, Err(NotTaken::Secure(Refused::Old)));
         assert_eq!(talk(&mut bench, &mut station, false), acknowledgements, "{kill:?}");
     }
@@ -72,7 +75,7 @@ fn what_only_services_can_answer_is_handed_out_and_telemetry_is_sealed() {
     talk(&mut bench, &mut station, false);
     let line = station.seal(bench.now, &Payload::Line("status"), &mut [0; MAX_FRAME]).expect("sealed").to_vec();
     let mut line = line;
-    let received = bench.link.receive(bench.now, STATION, &mut line).expect("taken");
+    let received = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut line).expect("taken");
     assert_eq!(received.map(|received| received.payload), Some(Payload::Line("status")));
 
     let mut kinds = Vec::new();
@@ -83,4 +86,187 @@ fn what_only_services_can_answer_is_handed_out_and_telemetry_is_sealed() {
     }
     kinds.sort_by_key(|kind| *kind as u8);
     assert_eq!(kinds, [stampfly_link::secure::Kind::Telemetry, stampfly_link::secure::Kind::Sample]);
+}
+
+const PAGE: Seat = Seat::Page(1);
+const OTHER_STATION: Address = Address([2, 0, 0, 0, 0, 8]);
+
+fn guided(kind: GuidedKind) -> GuidedCommand {
+    GuidedCommand { kind, ..GuidedCommand::default() }
+}
+
+/// A page asks, as at a port.
+fn ask(bench: &mut Bench<'_>, seat: Seat, kind: GuidedKind) -> Result<(), Refusal> {
+    let Bench { helm, link, now, .. } = bench;
+    helm.guide(*now, seat, guided(kind), &mut |passed| {
+        let stampfly_services::Passed::Command(command) = passed else { panic!("{passed:?}") };
+        link.command(*now, command).then_some(()).ok_or(Refusal::Full)
+    })
+}
+
+/// Lets time pass as the firmware's radio does it, with a handshake; returns what the station is told.
+fn heard(
+    bench: &mut Bench<'_>,
+    station: &mut Station,
+    millis: u64,
+    mut each: impl FnMut(&mut Bench<'_>, &mut Station),
+) -> Vec<String> {
+    let (mut texts, mut room) = (Vec::new(), [0; MAX_FRAME]);
+    for _ in 0..millis / 20 {
+        bench.pass(20, false, &[]);
+        each(bench, station);
+        let Bench { helm, link, now, said, .. } = bench;
+        link.keep(helm, *now);
+        said.extend(link.notice(helm, *now, &mut room).map(|(_, bytes)| bytes.to_vec()));
+        for mut frame in core::mem::take(said) {
+            match station.receive(*now, &mut frame).ok().flatten().map(|received| received.payload) {
+                Some(Payload::Refusal { counter, why }) => texts.push(format!("{counter}: {why}")),
+                Some(Payload::Notice { text, .. }) => texts.push(text.to_owned()),
+                Some(Payload::Acknowledgement { counter, taken }) => texts.push(format!("{counter}: {taken}")),
+                _ => {}
+            }
+        }
+        if let Some(frame) = station.transmit(*now, now.as_micros().to_le_bytes(), &mut room).map(<[u8]>::to_vec) {
+            let _ = link.receive(helm, *now, STATION, &mut frame.clone());
+        }
+    }
+    texts
+}
+
+/// A vehicle on a table that is ready, and its station.
+fn ready<'b>(bus: &'b mut topics::Bus) -> (Bench<'b>, Station) {
+    let mut bench = Bench::with_key(bus, None, Some(Vehicle::new(key())));
+    let mut station = Station::new(key());
+    heard(&mut bench, &mut station, 6_000, |_, _| {});
+    assert!(station.session().is_some());
+    (bench, station)
+}
+
+/// From another address, in the same session.
+fn say_from(bench: &mut Bench<'_>, station: &mut Station, from: Address, payload: &Payload<'_>) {
+    let mut frame = station.seal(bench.now, payload, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
+    assert_eq!(bench.link.receive(&mut bench.helm, bench.now, from, &mut frame), Ok(None), "{payload:?}");
+}
+
+#[test]
+fn a_station_is_refused_while_a_page_commands_and_told_who_does_and_what_was_done() {
+    let mut bus = topics::Bus::new();
+    let (mut bench, mut station) = ready(&mut bus);
+    assert_eq!(ask(&mut bench, PAGE, GuidedKind::Arm), Ok(()));
+    let told = heard(&mut bench, &mut station, 2_000, |_, _| {});
+    assert!(bench.armed());
+    assert_eq!(told.iter().filter(|told| *told == "page 1: arm").count(), 3, "frames are lost: {told:?}");
+
+    let number = 41;
+    say(&mut bench, &mut station, &Payload::Numbered { number, command: guided(GuidedKind::TakeOff) });
+    let told = heard(&mut bench, &mut station, 500, |_, _| {});
+    assert!(told.contains(&"41: page 1 commands".to_owned()) && !told.contains(&"41: true".to_owned()), "{told:?}");
+    assert_eq!(bench.helm.holder(bench.now), Some(PAGE));
+
+    // Its sticks, too, and it is told so now and then.
+    let told = heard(&mut bench, &mut station, 1_000, |bench, station| {
+        say(bench, station, &Payload::Sticks(PilotInput { throttle: 1.0, arm: true, ..PilotInput::default() }));
+    });
+    assert_eq!(told.iter().filter(|told| told.ends_with(": page 1 commands")).count(), 1, "{told:?}");
+    assert_eq!(bench.newest::<PilotInput>(Id::command_pilot), PilotInput::default());
+    assert_eq!(bench.newest::<FlightStatus>(Id::flight_status).commander, CommandSource::Guided);
+
+    // It may stop the motors, in each of its words.
+    say(&mut bench, &mut station, &Payload::Numbered { number: 42, command: guided(GuidedKind::Kill) });
+    let told = heard(&mut bench, &mut station, 200, |_, _| {});
+    assert!(!bench.armed() && told.contains(&"42: true".to_owned()), "{told:?}");
+}
+
+#[test]
+fn a_page_is_refused_while_a_station_commands_by_words_or_by_sticks() {
+    let arms = [
+        Payload::Numbered { number: 1, command: guided(GuidedKind::Arm) },
+        Payload::Sticks(PilotInput { arm: true, ..PilotInput::default() }),
+    ];
+    for arm in arms {
+        let mut bus = topics::Bus::new();
+        let (mut bench, mut station) = ready(&mut bus);
+        let off = Payload::Sticks(PilotInput::default());
+        heard(&mut bench, &mut station, 500, |bench, station| say(bench, station, &off).clear());
+        let is_sticks = matches!(arm, Payload::Sticks(_));
+        say(&mut bench, &mut station, &arm);
+        heard(&mut bench, &mut station, 500, |bench, station| {
+            if is_sticks {
+                say(bench, station, &arm);
+            }
+        });
+        assert!(bench.armed(), "{arm:?}");
+        let Some(holder @ Seat::Link(_)) = bench.helm.holder(bench.now) else { panic!("{arm:?}") };
+        assert_eq!(ask(&mut bench, PAGE, GuidedKind::TakeOff), Err(Refusal::Occupied(holder)));
+        assert_eq!(ask(&mut bench, PAGE, GuidedKind::Kill), Ok(()));
+        heard(&mut bench, &mut station, 100, |_, _| {});
+        assert!(!bench.armed());
+    }
+}
+
+#[test]
+fn nobody_else_keeps_a_vehicle_armed_whose_station_has_left() {
+    let mut bus = topics::Bus::new();
+    let (mut bench, mut station) = ready(&mut bus);
+    say(&mut bench, &mut station, &Payload::Numbered { number: 1, command: guided(GuidedKind::Arm) });
+    heard(&mut bench, &mut station, 200, |_, _| {});
+    assert!(bench.armed());
+    let alerts = |bench: &Bench<'_>| bench.newest::<SystemAlert>(Id::system_alert).active;
+    // Its signs of life keep the link, also between two that are half a second apart.
+    for _ in 0..6 {
+        say(&mut bench, &mut station, &Payload::Guided(GuidedCommand::default()));
+        heard(&mut bench, &mut station, 500, |bench, _| assert!(!alerts(bench).contains(Alerts::COMM_LOST)));
+    }
+    // It has left. Another station and a page chatter on.
+    let mut silent = None;
+    for turn in 0..250 {
+        heard(&mut bench, &mut station, 20, |bench, station| {
+            say_from(bench, station, OTHER_STATION, &Payload::Guided(GuidedCommand::default()));
+            let centred = Payload::Sticks(PilotInput { arm: true, ..PilotInput::default() });
+            say_from(bench, station, OTHER_STATION, &centred);
+            let now = bench.now;
+            assert!(!bench.helm.alive(now, PAGE));
+        });
+        if alerts(&bench).contains(Alerts::COMM_LOST) {
+            silent.get_or_insert(turn * 20);
+        }
+    }
+    assert!(silent.is_some_and(|ms| (2_500..=3_600).contains(&ms)), "{silent:?} ms after its last sign");
+    assert_eq!(bench.helm.holder(bench.now), None);
+    say_from(&mut bench, &mut station, OTHER_STATION, &Payload::Guided(guided(GuidedKind::Disarm)));
+    heard(&mut bench, &mut station, 100, |_, _| {});
+    assert!(!bench.armed());
+}
+
+#[test]
+fn the_paired_transmitter_is_a_seat_and_a_page_that_flies_by_hand_does_not_share_the_vehicle_with_it() {
+    let mut bus = topics::Bus::new();
+    let mut bench = Bench::new(&mut bus, Some(OLD));
+    bench.pass(6_000, false, &[(OLD, false)]);
+    bench.pass(500, false, &[(OLD, true)]);
+    assert!(bench.armed());
+    assert_eq!(bench.helm.holder(bench.now), Some(Seat::Transmitter));
+    assert_eq!(ask(&mut bench, PAGE, GuidedKind::TakeOff), Err(Refusal::Occupied(Seat::Transmitter)));
+    bench.pass(200, false, &[(OLD, false)]);
+    assert!(!bench.armed());
+
+    // Its switch is off, and a page arms with its own.
+    let (mut bus, mut was_armed) = (topics::Bus::new(), false);
+    let mut bench = Bench::new(&mut bus, Some(OLD));
+    bench.pass(6_000, false, &[(OLD, false)]);
+    for turn in 0..100 {
+        let input = PilotInput { arm: turn > 20, ..PilotInput::default() };
+        let (now, status) = (bench.now, bench.newest::<FlightStatus>(Id::flight_status));
+        let Bench { helm, link, .. } = &mut bench;
+        let _ = helm.steer(now, PAGE, &input, &status, &mut |passed| {
+            if let stampfly_services::Passed::Sticks(input) = passed {
+                link.sticks(now, &input);
+            }
+            Ok(())
+        });
+        bench.pass(20, false, &[(OLD, false)]);
+        assert!(bench.armed() || !was_armed, "it stays armed, turn {turn}");
+        was_armed = bench.armed();
+    }
+    assert!(was_armed && bench.helm.holder(bench.now) == Some(PAGE));
 }

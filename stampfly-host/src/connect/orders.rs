@@ -61,6 +61,11 @@ impl Orders {
         if self.commands.acknowledge(number, taken) { self.take(number) } else { Vec::new() }
     }
 
+    /// The questions that this refusal answers: the vehicle does not do what is asked, and says why.
+    pub fn refuse(&mut self, number: u32) -> Vec<u16> {
+        if self.commands.refuse(number) { self.take(number) } else { Vec::new() }
+    }
+
     /// Forgets commands that nobody answers any more. A station knows by itself what is not answered.
     fn forget(&mut self, now: Instant) {
         while let Some(over) = self.commands.over(now) {

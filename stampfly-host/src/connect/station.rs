@@ -266,6 +266,7 @@ impl Station {
                 }
             },
             Payload::Chunk(chunk) => tell(Said::Chunk(chunk)),
+            Payload::Notice { text, .. } => tell(Said::Text(text.to_owned())),
             Payload::Acknowledgement { taken, .. } => {
                 let line = self.line.take_if(|(typed, _)| typed.number == number);
                 let line = line.map(|(Typed { client, asked, .. }, _)| (client, asked));

@@ -20,6 +20,9 @@ pub(super) const VEHICLE: [u8; 2] = [1, 1];
 /// A command was not taken.
 const REFUSED: Payload<'static> = Payload::Acknowledgement { counter: 0, taken: false };
 
+/// Why sticks are refused is told again after this long.
+const TOLD_AGAIN: Duration = Duration::from_secs(10);
+
 /// What of the vehicle's tables is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Tables {
@@ -44,6 +47,10 @@ pub(super) struct Translation {
     questions: Questions,
     /// The vehicle's clock, ms, in its newest sample, and when that came: as the station knows it.
     clock: Option<(u32, Instant)>,
+    /// The number of the newest notice.
+    noticed: Option<u32>,
+    /// Why sticks were refused, and when that was told last.
+    refused: Option<(String, Instant)>,
     /// Frames for the station.
     pub frames: VecDeque<u8>,
 }
@@ -61,6 +68,8 @@ impl Translation {
             orders: Orders::default(),
             questions: Questions::default(),
             clock: None,
+            noticed: None,
+            refused: None,
             frames: VecDeque::new(),
         }
     }
@@ -115,6 +124,15 @@ impl Translation {
         self.questions.end_line();
     }
 
+    /// Is this another reason than the one that people know, or was that long ago?
+    fn is_news(&mut self, now: Instant, why: &str) -> bool {
+        let is_known = self.refused.as_ref().is_some_and(|(known, at)| known == why && now.since(*at) < TOLD_AGAIN);
+        if !is_known {
+            self.refused = Some((why.to_owned(), now));
+        }
+        !is_known
+    }
+
     /// Takes what the vehicle says.
     pub fn hear(&mut self, now: Instant, payload: &Payload<'_>) {
         if let Payload::Tables { fingerprint } = *payload {
@@ -138,6 +156,15 @@ impl Translation {
                 }
                 (numbers, *payload)
             }
+            Payload::Refusal { counter, why } => match self.orders.refuse(counter) {
+                // Sticks have no question: people are told.
+                numbers if numbers.is_empty() && self.is_news(now, why) => {
+                    (vec![0], Payload::Notice { number: counter, text: why })
+                }
+                numbers => (numbers, Payload::Reply { text: why, last: true }),
+            },
+            // It comes several times.
+            Payload::Notice { number, .. } if self.noticed.replace(number) == Some(number) => return,
             Payload::Parameter { index, value, taken } => {
                 (vec![self.questions.parameter(index, value, taken)], *payload)
             }

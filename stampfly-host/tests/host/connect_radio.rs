@@ -232,6 +232,105 @@ fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
     passes(&mut socket, 2);
 }
 
+/// A vehicle with a page of its own, and another page behind a station by radio.
+struct Shared {
+    serving: Program,
+    connected: Program,
+    beside: WebSocket<TcpStream>,
+    radio: WebSocket<TcpStream>,
+    /// Where the height is in a sample, for each page.
+    down: [usize; 2],
+}
+
+impl Shared {
+    fn new(name: &str) -> Self {
+        let folder = folder("connect", name);
+        let ours = key(&folder, "ours", 1);
+        let ports = ["serve", "--port", "others=off", "--port", "http=0", "--port", "sealed=0", "--key", &ours];
+        let mut serving = Program::start(&folder, &ports);
+        let vehicle = serving.said("sealed", "listening on ");
+        let mut beside = page(&serving.said("http ", "http://"));
+        let (connected, mut radio) = connect(&folder, &format!("udp:{vehicle}"), &["--key", &ours]);
+        let hellos = [next(&mut beside, "hello", |_| true), next(&mut radio, "hello", |_| true)];
+        next(&mut radio, "event", is_up(true));
+        let down = [see(&mut beside, &hellos[0]), see(&mut radio, &hellos[1])];
+        is_done(&mut radio, 7, "status", "blocks   NO_LINK\n");
+        Self { serving, connected, beside, radio, down }
+    }
+}
+
+fn told(socket: &mut WebSocket<TcpStream>, what: &str) {
+    next(socket, "event", |event| event["text"].as_str().is_some_and(|text| text.contains(what)));
+}
+
+fn refused(answer: &Value, holder: &str) {
+    let text = answer["text"].as_str().unwrap_or_default();
+    assert!(answer["ok"] == json!(false) && text.contains(holder) && text.contains("commands"), "{answer}");
+}
+
+#[test]
+fn a_page_commands_and_a_station_by_radio_is_refused_and_told_who_does_and_may_kill() {
+    let _alone = alone();
+    let Shared { serving: _serving, connected: _connected, mut beside, mut radio, down } = Shared::new("page_first");
+    passes(&mut beside, 1);
+    guided(&mut beside, 8, json!({ "kind": "arm" }));
+    fly(&mut beside, down[0]);
+    told(&mut radio, ": take off");
+    alive(&mut beside);
+    let go = json!({ "do": "guided", "kind": "go_to", "north": 1.0, "east": 0.0, "up": 0.5, "yaw": 0.0 });
+    refused(&ask_once(&mut radio, 9, go), "page ");
+    alive(&mut beside);
+    // The page still commands.
+    guided(&mut beside, 10, json!({ "kind": "hold" }));
+    guided(&mut radio, 11, json!({ "kind": "kill" }));
+    told(&mut beside, "the station with the key, line 1: KILL");
+    is_done(&mut beside, 12, "status", "CRASHED");
+}
+
+#[test]
+fn a_station_by_radio_commands_and_a_page_is_refused_and_keeps_nothing_in_the_air_when_the_station_has_left() {
+    let _alone = alone();
+    let Shared { serving: _serving, connected, mut beside, mut radio, down } = Shared::new("radio_first");
+    passes(&mut radio, 1);
+    guided(&mut radio, 8, json!({ "kind": "arm" }));
+    fly(&mut radio, down[1]);
+    told(&mut beside, "the station with the key, line 1: take off");
+    alive(&mut radio);
+    refused(&ask_once(&mut beside, 9, json!({ "do": "guided", "kind": "hold" })), "the station with the key");
+    // Its signs of life are half a second apart, as a page's are.
+    for _ in 0..8 {
+        alive(&mut radio);
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(is_at(&mut beside, down[0], 0.2..0.4, SOON), "it stays in the air");
+    }
+    drop((connected, radio));
+    let left = Instant::now();
+    // The page chatters on.
+    let sticks = json!({ "vehicle": 0, "id": 0, "do": "sticks", "roll": 0, "pitch": 0, "yaw": 0, "throttle": 0,
+        "mode": "poshold", "arm": true, "kill": false });
+    let mut height = 1.0;
+    while height > 0.1 {
+        alive(&mut beside);
+        beside.send(Message::text(sticks.to_string())).expect("sent");
+        height = -sample(&mut beside)[down[0]].as_f64().expect("a number");
+        assert!(left.elapsed() < SOON, "it is still at {height} m");
+    }
+    assert!(left.elapsed() > Duration::from_secs(3), "{:?}", left.elapsed());
+    let until = Instant::now() + SOON;
+    // It has landed, and the page may fly it.
+    loop {
+        alive(&mut beside);
+        let status = ask(&mut beside, 11, json!({ "do": "console", "line": "status" }));
+        let text = status["text"].as_str().unwrap_or_default();
+        if text.contains("blocks   -") || text.contains("blocks   \n") || text.contains("blocks   none") {
+            break;
+        }
+        assert!(Instant::now() < until && !text.contains("CRASHED"), "{text}");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    guided(&mut beside, 12, json!({ "kind": "arm" }));
+}
+
 #[test]
 fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
     let _alone = alone();

@@ -131,6 +131,17 @@ impl Commands {
         is_done
     }
 
+    /// Takes a [refusal](Payload::Refusal). Was it the command that is being said? It is not said again: the vehicle would refuse
+    /// it again, or do it when nobody expects it any more. A kill is never refused, and goes on.
+    pub fn refuse(&mut self, number: u32) -> bool {
+        let is_it = |said: &Said| said.number == number && !said.is_kill();
+        let is_first = self.waiting.first().is_some_and(|first| first.as_ref().is_some_and(is_it));
+        if is_first {
+            self.remove(0);
+        }
+        is_first
+    }
+
     /// The number of a command that was not acknowledged in time, or that a kill has ended. Nobody knows whether it was taken. Ask until there is
     /// none, before anything is [said](Self::say): until then it takes its room.
     pub fn over(&mut self, now: Instant) -> Option<u32> {

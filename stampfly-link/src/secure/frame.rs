@@ -81,11 +81,15 @@ pub enum Kind {
     Tables = 0xC2,
     /// A frame of the station has been taken, or what is in it refused.
     Acknowledgement = 0xD0,
+    /// Why what is in a frame of the station was refused.
+    Refusal = 0xD1,
+    /// What was asked of the vehicle, and by whom.
+    Notice = 0xD2,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 24] = [
         Self::Join,
         Self::Ready,
         Self::Sticks,
@@ -108,6 +112,8 @@ impl Kind {
         Self::Chunk,
         Self::Tables,
         Self::Acknowledgement,
+        Self::Refusal,
+        Self::Notice,
     ];
 
     /// Does the vehicle send it, and not the station?

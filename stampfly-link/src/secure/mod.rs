@@ -74,6 +74,8 @@
 //! | a parameter | ask again: to write it twice is to write it once |
 //! | a line, or a part of its answer | ask again with a [question](Payload::Question) of the same number, from where the answer is missing |
 //! | what is refused with motors armed | the vehicle acknowledges it as refused |
+//! | a command that is refused because another commands | the vehicle says why, each time that it hears it |
+//! | what was asked of the vehicle, and by whom | the vehicle says it several times, with a number |
 //!
 //! # Floods
 //!

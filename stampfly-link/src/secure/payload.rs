@@ -20,6 +20,8 @@
 //! | C1 chunk | vehicle | a chunk of the flight record, with its number and check sum |
 //! | C2 tables | vehicle | u16 fingerprint of its tables of topics and parameters |
 //! | D0 acknowledgement | vehicle | u32 counter of a frame of the station, of a numbered command its number; u8 whether it was taken |
+//! | D1 refusal | vehicle | u32 as in D0; text: why it was not taken, such as who commands. It is not to be said again |
+//! | D2 notice | vehicle | u32 number of the notice, the same when it comes again; text: what was asked of the vehicle, and by whom |
 //!
 //! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and
 //! subnormal numbers are refused, so that a value has one form; they are sent as zero. Text is UTF-8 without control
@@ -139,6 +141,21 @@ pub enum Payload<'f> {
         /// Was it taken?
         taken: bool,
     },
+    /// A frame of the station was refused, from the vehicle: a command or sticks while another commands. Stations of before this kind do not know it, and say a
+    /// command again until they give it up.
+    Refusal {
+        /// As in an [acknowledgement](Self::Acknowledgement).
+        counter: u32,
+        /// The reason, for people.
+        why: &'f str,
+    },
+    /// What was asked of the vehicle, and by whom, from the vehicle. It is said several times, because frames are lost.
+    Notice {
+        /// Another than that of the notice before.
+        number: u32,
+        /// For people.
+        text: &'f str,
+    },
 }
 
 impl<'f> Payload<'f> {
@@ -164,6 +181,8 @@ impl<'f> Payload<'f> {
             Self::Chunk(_) => Kind::Chunk,
             Self::Tables { .. } => Kind::Tables,
             Self::Acknowledgement { .. } => Kind::Acknowledgement,
+            Self::Refusal { .. } => Kind::Refusal,
+            Self::Notice { .. } => Kind::Notice,
         }
     }
 
@@ -257,6 +276,10 @@ impl<'f> Payload<'f> {
                 to.bytes(&counter.to_le_bytes())?;
                 to.truth(*taken)?;
             }
+            Self::Refusal { counter: number, why: text } | Self::Notice { number, text } => {
+                to.bytes(&number.to_le_bytes())?;
+                to.text(text)?;
+            }
         }
         Ok(to.length())
     }
@@ -323,6 +346,14 @@ impl<'f> Payload<'f> {
             Kind::Acknowledgement => {
                 let counter = u32::from_le_bytes(from.bytes()?);
                 Self::Acknowledgement { counter, taken: from.truth()? }
+            }
+            Kind::Refusal => {
+                let counter = u32::from_le_bytes(from.bytes()?);
+                Self::Refusal { counter, why: from.text()? }
+            }
+            Kind::Notice => {
+                let number = u32::from_le_bytes(from.bytes()?);
+                Self::Notice { number, text: from.text()? }
             }
             Kind::Join | Kind::Ready | Kind::Announcement | Kind::Welcome => return None,
         };

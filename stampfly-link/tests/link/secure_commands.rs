@@ -220,3 +220,20 @@ fn what_a_kill_has_ended_leaves_its_room_and_a_kill_by_the_sticks_ends_it_too() 
     commands.end(now);
     assert_eq!((commands.over(now), commands.over(now)), (Some(5), None), "the kill is still said");
 }
+
+#[test]
+fn a_command_that_is_refused_is_not_said_again_and_the_next_one_is() {
+    let (mut commands, now) = (Commands::new(), Instant::ZERO);
+    for (number, kind) in [(7, GuidedKind::TakeOff), (8, GuidedKind::Land)] {
+        assert!(commands.say(now, number, command(kind)));
+    }
+    assert!(commands.next(now).is_some());
+    assert!(!commands.refuse(8), "it was not said yet");
+    assert!(commands.refuse(7) && !commands.refuse(7));
+    assert_eq!(commands.next(now), Some(Payload::Numbered { number: 8, command: command(GuidedKind::Land) }));
+    assert_eq!(commands.over(now + Duration::from_secs(2)), Some(8));
+
+    assert!(commands.say(now, 9, command(GuidedKind::Kill)));
+    assert!(!commands.refuse(9), "no vehicle refuses a kill");
+    assert!(commands.next(now).is_some_and(|payload| payload.is_kill()));
+}

@@ -88,6 +88,8 @@ fn payload() -> impl Strategy<Value = Payload<'static>> {
         ))),
         any::<u16>().prop_map(|fingerprint| Payload::Tables { fingerprint }),
         (any::<u32>(), any::<bool>()).prop_map(|(counter, taken)| Payload::Acknowledgement { counter, taken }),
+        (any::<u32>(), text(MAX_BODY - 4)).prop_map(|(counter, why)| Payload::Refusal { counter, why }),
+        (any::<u32>(), text(MAX_BODY - 4)).prop_map(|(number, text)| Payload::Notice { number, text }),
     ]
 }
 

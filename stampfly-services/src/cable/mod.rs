@@ -76,6 +76,8 @@ pub struct Cable<const WATCHED: usize, const ITEMS: usize = { crate::mavlink::IT
     waits: heapless::Vec<(u16, Waited), WAITS>,
     /// Chunks of the flight record that were sent.
     chunks: u16,
+    /// What was asked of the vehicle, and told to the station.
+    told: u32,
 }
 
 impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
@@ -92,6 +94,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             foreign: 0,
             waits: heapless::Vec::new(),
             chunks: 0,
+            told: 0,
         }
     }
 
@@ -253,7 +256,17 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, samples: &dyn Samples, put: Put<'_>) {
         self.mavlink.poll(now, cockpit, &mut |(), frame| put(frame));
         self.settle(now, cockpit, put);
-        if !self.is_spoken(now) {
+        let is_spoken = self.is_spoken(now);
+        while let Some((number, what)) = cockpit.told(self.told) {
+            self.told = number;
+            if is_spoken {
+                let mut text = heapless::String::<96>::new();
+                // What is too long is cut.
+                _ = core::fmt::Write::write_fmt(&mut text, format_args!("{what}"));
+                self.say(0, &Payload::Notice { number, text: &text }, put);
+            }
+        }
+        if !is_spoken {
             return self.forget();
         }
         let Self { watches, mavlink, table, .. } = self;

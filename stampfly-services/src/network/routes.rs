@@ -1,14 +1,15 @@
 //! Where the station with the key is, if it speaks over a network: the addresses that the secure link knows, for places of a network.
 //!
 //! [`Guarded`](stampfly_link::secure::Guarded) tells stations apart by six bytes, and answers whoever has sent the newest frame that was authentic. A place of a network has six bytes of its
-//! own, so it gets one of two addresses that no radio has. The other belongs to whoever has spoken last without having proved anything, and never replaces the station's.
+//! own, so it gets an address that no radio has, and that no place before it had: who commands is told by it. There are two; the other belongs to whoever has spoken last without
+//! having proved anything, and never replaces the station's.
 
 use core::net::SocketAddrV4;
 use stampfly_link::Address;
 use stampfly_types::{Duration, Instant};
 
 /// Addresses of a group that is locally administered, which no transmitter has as its own.
-const PREFIX: [u8; 5] = [0x03, b'U', b'D', b'P', 0];
+const PREFIX: [u8; 3] = [0x03, b'U', b'D'];
 /// Whoever has said nothing for this long is sent no offer of a session.
 const RECENT: Duration = Duration::from_secs(2);
 
@@ -27,36 +28,57 @@ const RECENT: Duration = Duration::from_secs(2);
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Routes {
-    places: [Option<(SocketAddrV4, Instant)>; 2],
+    places: [Option<Place>; 2],
+    /// Addresses so far.
+    count: u32,
+}
+
+/// A place of the network, its address, and when it has spoken.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    place: SocketAddrV4,
+    address: Address,
+    heard: Instant,
 }
 
 impl Routes {
     /// Nobody has spoken.
     #[must_use]
     pub const fn new() -> Self {
-        Self { places: [None; 2] }
+        Self { places: [None; 2], count: 0 }
     }
 
     /// The address of whoever has sent a datagram from this place. `station` is where the newest authentic frame came from.
     pub fn source(&mut self, now: Instant, from: SocketAddrV4, station: Option<Address>) -> Address {
-        let known = self.places.iter().position(|place| place.is_some_and(|(place, _)| place == from));
-        let index = known.unwrap_or_else(|| usize::from(station == Some(address(0))));
-        if let Some(place) = self.places.get_mut(index) {
-            *place = Some((from, now));
+        if let Some(known) = self.places.iter_mut().flatten().find(|known| known.place == from) {
+            known.heard = now;
+            return known.address;
         }
-        address(index)
+        let [first, second] = &mut self.places;
+        let is_station = |place: &Option<Place>| place.is_some_and(|place| Some(place.address) == station);
+        let (place, other) = if is_station(first) { (second, &*first) } else { (first, &*second) };
+        let mut address;
+        // They come round: not to that of the other place.
+        loop {
+            self.count = self.count.wrapping_add(1);
+            address = address_of(self.count);
+            if other.is_none_or(|other| other.address != address) {
+                break;
+            }
+        }
+        *place = Some(Place { place: from, address, heard: now });
+        address
     }
 
     /// The place that has this address. `None` for those of a radio.
     #[must_use]
     pub fn place(&self, of: Address) -> Option<SocketAddrV4> {
-        let index = (0..self.places.len()).find(|index| address(*index) == of)?;
-        self.places.get(index).copied().flatten().map(|(place, _)| place)
+        self.places.iter().flatten().find(|place| place.address == of).map(|place| place.place)
     }
 
     /// Who is to be offered a session: whoever has spoken just now.
     pub fn recent(&self, now: Instant) -> impl Iterator<Item = SocketAddrV4> {
-        self.places.iter().flatten().filter(move |(_, at)| now.since(*at) < RECENT).map(|(place, _)| *place)
+        self.places.iter().flatten().filter(move |place| now.since(place.heard) < RECENT).map(|place| place.place)
     }
 
     /// The network is another: nobody is where they were.
@@ -65,9 +87,9 @@ impl Routes {
     }
 }
 
-const fn address(index: usize) -> Address {
-    let [a, b, c, d, e] = PREFIX;
-    Address([a, b, c, d, e, index as u8])
+const fn address_of(number: u32) -> Address {
+    let ([a, b, c], [_, d, e, f]) = (PREFIX, number.to_be_bytes());
+    Address([a, b, c, d, e, f])
 }
 
 #[cfg(test)]
@@ -104,6 +126,21 @@ mod tests {
         assert_eq!(routes.recent(Instant::from_secs(5)).count(), 0);
         routes.clear();
         assert_eq!(routes.place(station), None);
+    }
+
+    #[test]
+    fn an_address_is_of_one_place_and_a_place_that_stays_keeps_its_own() {
+        let mut routes = Routes::new();
+        let of = routes.source(Instant::ZERO, place(1), None);
+        let mut seen = std::collections::BTreeSet::from([of.0]);
+        for stranger in 1_000..2_000 {
+            assert!(seen.insert(routes.source(Instant::ZERO, place(stranger), Some(of)).0), "{stranger}");
+            assert_eq!(routes.source(Instant::ZERO, place(1), Some(of)), of);
+        }
+        // They come round, and not to the station's.
+        routes.count = u32::from_be_bytes([0, of.0[3], of.0[4], of.0[5]]).wrapping_sub(1);
+        assert_ne!(routes.source(Instant::ZERO, place(9), Some(of)), of);
+        assert_eq!(routes.place(of), Some(place(1)));
     }
 
     #[test]

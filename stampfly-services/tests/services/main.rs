@@ -4,6 +4,7 @@
 mod cable;
 mod common;
 mod desk;
+mod helm;
 #[cfg(feature = "mavlink")]
 mod mavlink;
 #[cfg(feature = "mavlink")]

@@ -94,6 +94,7 @@ pub struct Parts {
     /// The vehicle's key, if it has one yet.
     pub key: Option<Key>,
     pub link: &'static RefCell<Link<'static>>,
+    pub helm: &'static RefCell<Helm>,
     /// What a station with the key asks by radio.
     pub desk: &'static RefCell<RadioDesk>,
     /// The flight record.
@@ -183,7 +184,7 @@ fn place(
 fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: String<128>) -> Console {
     #[cfg(feature = "wifi")]
     let network = served::Served::new(parts.network);
-    let Parts { memory, health, profile, ends, storage, storage_ends, config, facts, key, link, desk, taken, .. } =
+    let Parts { memory, health, profile, ends, storage, storage_ends, config, facts, key, link, helm, desk, taken, .. } =
         *parts;
     let (told, flown) = (Told::new(config.clone()), (config.clone(), false));
     let cable = Cable::new(IDENTITY, fingerprint(&TOPICS, &config));
@@ -203,7 +204,7 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
         desk,
         taken,
         cable,
-        helm: Helm::new(),
+        helm,
         places: Places::of(&TOPICS),
         later: None,
         news: News::default(),
@@ -260,7 +261,8 @@ pub struct Console {
     taken: &'static RefCell<Taken>,
     /// Everything that is spoken on the line.
     cable: Cable<{ TOPICS.len() }, ITEMS>,
-    helm: Helm,
+    /// Who commands, here and by radio.
+    helm: &'static RefCell<Helm>,
     places: Places,
     /// What a service has asked for.
     later: Option<Later>,
@@ -295,8 +297,9 @@ impl Console {
         memory.catch_up();
         let view = View::new(&memory.newest, places);
         let hands = &mut Hands { link, ends, config, later };
+        let mut helm = helm.borrow_mut();
         helm.poll(now, view.state().armed, hands);
-        let mut cockpit = Seated { helm, hands, view };
+        let mut cockpit = Seated { helm: &mut helm, hands, view };
         let mut send = |frame: &[u8]| put(frames, frame);
         cable.hear(now, bytes, &mut cockpit, &mut send, &mut |key| {
             let _ = text.push(key);

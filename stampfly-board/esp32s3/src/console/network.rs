@@ -23,7 +23,7 @@ impl Console {
         memory.catch_up();
         let view = View::new(&memory.newest, places);
         let hands = &mut Hands { link, ends, config, later };
-        ports.turn(now, stack, &mut Seated { helm, hands, view });
+        ports.turn(now, stack, &mut Seated { helm: &mut helm.borrow_mut(), hands, view });
     }
 
     /// Reserves times of signatures, and opens the ports when there are some. Flash is written on a disarmed vehicle alone.

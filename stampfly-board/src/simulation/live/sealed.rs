@@ -1,6 +1,7 @@
 //! The simulated StampFly's secure link in a network: the firmware's [`Link`](crate::link::Link), with this machine's datagrams in place of a radio.
 //!
-//! Whoever has the key flies, asks and watches as on the vehicle's own Wi-Fi. Without a key the port is not there.
+//! A station with the key flies, asks and watches as on the vehicle's own Wi-Fi, and asks the same helm for the lease as programs at the other ports. Without a key
+//! the port is not there.
 
 use super::seats::{Board, Controls, obey};
 use super::{SEALED, Seen};
@@ -12,7 +13,7 @@ use core::hash::BuildHasher as _;
 use core::net::{SocketAddr, SocketAddrV4};
 use stampfly_flight::console::Request;
 use stampfly_link::Address;
-use stampfly_link::secure::{Heard, Key, MAX_FRAME, MIN_FRAME, Payload, Sample, Vehicle};
+use stampfly_link::secure::{Key, MAX_FRAME, MIN_FRAME, Payload, Sample, Vehicle};
 use stampfly_services::RadioDesk;
 use stampfly_services::cable::fingerprint;
 use stampfly_services::desk::{Answer, Room};
@@ -40,10 +41,11 @@ impl Sealed {
 
     /// Takes what has come.
     pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>, put: Put<'_>) {
-        if !controls.hands.radio.is_open() {
+        let (helm, hands) = controls.helm();
+        if !hands.radio.is_open() {
             return;
         }
-        let (SocketAddr::V4(place), Some(link)) = (from.address, controls.hands.radio.link()) else { return };
+        let (SocketAddr::V4(place), Some(link)) = (from.address, hands.radio.link()) else { return };
         let mut room = [0; MAX_FRAME];
         // Nothing is noted of those who ask for an offer: no number of them keeps a station out.
         if bytes.is_empty() {
@@ -53,9 +55,7 @@ impl Sealed {
         let source = self.routes.source(now, place, link.guarded.station());
         let Some(frame) = room.get_mut(..bytes.len()).filter(|frame| frame.len() >= MIN_FRAME) else { return };
         frame.copy_from_slice(bytes);
-        if let Ok(Heard::Authentic(received)) = link.guarded.receive_sealed(now, source, frame)
-            && let Some(received) = link.obey(now, received)
-        {
+        if let Ok(Some(received)) = link.receive_sealed(helm, now, source, frame) {
             // A station asks again for what there is no room for.
             self.desk.ask(now, &received.payload);
         }
@@ -63,7 +63,8 @@ impl Sealed {
 
     /// Sends what is due. Call it every 20 ms.
     pub fn poll(&mut self, now: Instant, controls: &mut Controls<'_>, desk: &Desk<'_>, put: Put<'_>) {
-        let Board { radio, console, config, seen, .. } = &mut controls.hands;
+        let (helm, hands) = controls.helm();
+        let Board { radio, console, config, seen, .. } = hands;
         let is_open = radio.is_open();
         let Some(link) = radio.link() else { return };
         let Self { routes, desk: asked } = self;
@@ -84,6 +85,9 @@ impl Sealed {
             if let Some((to, frame)) = link.transmit(now, what, fresh(), &mut room) {
                 send(to, frame);
             }
+        }
+        if let Some((to, frame)) = link.notice(helm, now, &mut room) {
+            send(to, frame);
         }
         let station = link.guarded.station().and_then(|station| routes.place(station));
         let station = station.map(|place| Client { port: SEALED, address: place.into() });

@@ -1,0 +1,145 @@
+//! Whose sticks reach the vehicle: those of one source at a time.
+//!
+//! Two transmitters, or a transmitter and a page, send frames at the same time, fifty times a second
+//! each. If the frames of both reached the mode machine, one arm switch would turn on and off with
+//! every frame.
+//!
+//! | the vehicle | whose sticks are passed on |
+//! |---|---|
+//! | is disarmed | those of the source that came first, until it is silent, or another's arm switch is turned on |
+//! | is armed | those of the seat that has the lease |
+//! | is armed, and a program commands | also the paired transmitter's: its pilot takes over by acting, as the mode machine decides, and has the lease then |
+//!
+//! A kill is passed on from every source. An arm switch that is turned off in a frame that is not
+//! passed on is a command to land.
+
+use crate::lease::{Lease, SILENCE};
+use crate::refusal::{Refusal, Seat};
+use stampfly_types::Instant;
+use stampfly_types::messages::{CommandSource, FlightStatus, PilotInput};
+
+/// Other sources whose arm switches are followed.
+const OTHERS: usize = 3;
+/// A stick that is so far out of its middle is held by a hand, share.
+const HELD: f32 = 0.1;
+
+/// What becomes of a frame of sticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// It is passed on, and flies the vehicle.
+    Flies,
+    /// It is passed on, and the mode machine decides.
+    Passes,
+    /// It is not passed on, because of this seat.
+    Refused(Seat),
+    /// The same, and it asks for a landing.
+    Lands(Seat),
+}
+
+/// A source of sticks, and when its newest frame came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Source {
+    seat: Seat,
+    heard: Instant,
+    arm: bool,
+}
+
+/// Whose sticks reach the vehicle.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StickSource {
+    /// Whose newest frame was passed on.
+    source: Option<Source>,
+    /// Those whose frames were not.
+    others: [Option<Source>; OTHERS],
+}
+
+impl StickSource {
+    pub const fn new() -> Self {
+        Self { source: None, others: [None; OTHERS] }
+    }
+
+    /// Looks at a frame, and takes the lease for its seat if it flies the vehicle.
+    pub fn judge(
+        &mut self,
+        now: Instant,
+        seat: Seat,
+        input: &PilotInput,
+        status: &FlightStatus,
+        lease: &mut Lease,
+    ) -> Verdict {
+        let frame = Source { seat, heard: now, arm: input.arm };
+        let before = self.others.iter().flatten().find(|other| other.seat == seat).map(|other| other.arm);
+        let rival = self.source.filter(|source| source.seat != seat && now.since(source.heard) < SILENCE);
+        let (rises, falls) = (before == Some(false) && input.arm, before == Some(true) && !input.arm);
+        let refused = match (status.armed, rival) {
+            (true, rival) => self.refusal_in_flight(now, seat, status, rival, lease),
+            // Its arm switch was seen off: one that is on when its frames begin must not arm.
+            (false, Some(rival)) if !rises || rival.arm => Some(rival.seat),
+            (false, _) => lease.holder(now).filter(|holder| *holder != seat),
+        };
+        if let Some(holder) = refused {
+            self.put_aside(frame);
+            return if falls && status.armed { Verdict::Lands(holder) } else { Verdict::Refused(holder) };
+        }
+        self.forget(seat);
+        self.source = Some(frame);
+        match seat {
+            // What it does is the mode machine's decision. It has the lease as long as a hand holds the sticks, and a
+            // program may lead again when it has let go.
+            Seat::Transmitter if status.armed => {
+                let is_held =
+                    [input.roll, input.pitch, input.yaw, input.throttle].iter().any(|stick| stick.abs() > HELD);
+                let flies = status.commander == CommandSource::Pilot;
+                if flies && (is_held || status.mode.is_manual() || lease.commander().is_none()) {
+                    lease.take(now, seat);
+                }
+                if flies { Verdict::Flies } else { Verdict::Passes }
+            }
+            _ if status.armed => Verdict::Flies,
+            _ => Verdict::Passes,
+        }
+    }
+
+    /// Who keeps these sticks from an armed vehicle.
+    fn refusal_in_flight(
+        &self,
+        now: Instant,
+        seat: Seat,
+        status: &FlightStatus,
+        rival: Option<Source>,
+        lease: &mut Lease,
+    ) -> Option<Seat> {
+        match lease.taker() {
+            Some(holder) if holder != seat => {
+                // While another's sticks fly, or have flown it last, the transmitter's would keep its flight going.
+                let is_source = self.source.is_some_and(|source| source.seat == seat);
+                let is_heard = is_source || (status.commander != CommandSource::Pilot && rival.is_none());
+                (seat != Seat::Transmitter || !is_heard).then_some(holder)
+            }
+            None if rival.is_some() => rival.map(|rival| rival.seat),
+            _ if seat == Seat::Transmitter => None,
+            _ => match lease.steer(now, seat) {
+                Err(Refusal::Occupied(holder)) => Some(holder),
+                _ => None,
+            },
+        }
+    }
+
+    /// Notes a frame that is not passed on, in the place of the seat's last one, a free place, or the oldest frame's.
+    fn put_aside(&mut self, frame: Source) {
+        let heard = |other: &Option<Source>| match other {
+            Some(other) if other.seat == frame.seat => None,
+            other => Some(other.map(|other| other.heard)),
+        };
+        // `None` is less than any instant.
+        if let Some(place) = self.others.iter_mut().min_by_key(|other| heard(other)) {
+            *place = Some(frame);
+        }
+    }
+
+    fn forget(&mut self, seat: Seat) {
+        for other in &mut self.others {
+            other.take_if(|other| other.seat == seat);
+        }
+    }
+}
