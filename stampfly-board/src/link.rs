@@ -174,7 +174,7 @@ impl<'b> Link<'b> {
         None
     }
 
-    /// Follows the vehicle's state, and passes the commander's signs of life on, whoever it is. The firmware's radio calls it every 20 ms, beside the console's
+    /// Follows the vehicle's state, and passes the signs of life of the seat that has the lease on. The firmware's radio calls it every 20 ms, beside the console's
     /// services, which may have to wait.
     pub fn keep(&mut self, helm: &mut Helm, now: Instant) {
         let armed = self.status().armed;

@@ -205,7 +205,7 @@ fn a_page_is_refused_while_a_station_commands_by_words_or_by_sticks() {
 }
 
 #[test]
-fn nobody_else_keeps_a_vehicle_armed_whose_station_has_left() {
+fn another_station_and_a_page_do_not_keep_a_vehicle_armed_whose_station_has_left() {
     let mut bus = topics::Bus::new();
     let (mut bench, mut station) = ready(&mut bus);
     say(&mut bench, &mut station, &Payload::Numbered { number: 1, command: guided(GuidedKind::Arm) });

@@ -399,6 +399,34 @@ mod tests {
     }
 
     #[test]
+    fn a_refusal_answers_its_command_which_is_not_said_again_and_what_is_told_is_told_once() {
+        let mut line = Line::to(OURS);
+        let why = "page 1 commands";
+        line.say(2, &guided(GuidedKind::TakeOff));
+        let refusal = Payload::Refusal { counter: FIRST.wrapping_add(2), why };
+        assert_eq!(line.hear(&refusal), read(&Payload::Reply { text: why, last: true }, 2));
+        line.sent.clear();
+        line.pass(2_000);
+        assert!(line.sent.is_empty(), "{:?}", line.sent);
+
+        // Of sticks, which have no number: people are told, and not again and again.
+        for seconds in [0, 2, 4] {
+            let sticks = Payload::Refusal { counter: 70 + seconds, why };
+            let told = line.hear(&sticks);
+            assert_eq!(told, read(&Payload::Notice { number: 70, text: why }, 0).filter(|_| seconds == 0));
+            line.pass(2_000);
+        }
+        let other = Payload::Refusal { counter: 77, why: "page 2 commands" };
+        assert!(line.hear(&other).is_some());
+
+        let notice = Payload::Notice { number: 5, text: "page 1: take off" };
+        assert_eq!(line.hear(&notice), read(&notice, 0));
+        assert_eq!([line.hear(&notice), line.hear(&notice)], [None, None]);
+        let next = Payload::Notice { number: 6, text: "page 1: land" };
+        assert_eq!(line.hear(&next), read(&next, 0));
+    }
+
+    #[test]
     fn a_part_that_is_lost_is_asked_for_and_the_answer_has_no_hole() {
         let mut line = Line::to(OURS);
         line.say(8, &Payload::Line("param list"));

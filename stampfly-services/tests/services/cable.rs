@@ -6,9 +6,9 @@ use stampfly_flight::console::Request;
 use stampfly_link::mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage, MavType};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter, Tunnel};
 use stampfly_link::secure::Payload;
-use stampfly_services::Cockpit;
 use stampfly_services::cable::{Assembly, BODY, Cable, Envelope, PART, PAUSE, Part, Split, TYPE, fingerprint};
 use stampfly_services::mavlink::Identity;
+use stampfly_services::{Asked, Cockpit, Seat, Told};
 use stampfly_types::messages::*;
 use stampfly_types::{Duration, Instant};
 
@@ -317,6 +317,20 @@ fn commands_are_acknowledged_or_refused_in_words_and_signs_of_life_are_its_own()
     line.ask(&sticks, 6);
     let kinds: Vec<_> = line.vehicle.guided.iter().map(|command| command.kind).collect();
     assert_eq!((kinds, line.vehicle.steered.len()), (vec![GuidedKind::Arm, GuidedKind::Kill], 1));
+}
+
+#[test]
+fn a_station_is_told_once_what_others_ask() {
+    let mut line = Line::new();
+    let told = |kind| Told { seat: Seat::Link(7), what: Asked::Command(kind) };
+    line.vehicle.told.push(told(GuidedKind::Arm));
+    line.turn();
+    assert_eq!(line.heard(), [], "there is none yet");
+    line.ask(&Payload::Guided(GuidedCommand::default()), 1);
+    line.vehicle.told.push(told(GuidedKind::TakeOff));
+    (0..10).for_each(|_| assert_eq!(line.turn(), None));
+    let notice = Payload::Notice { number: 2, text: "the station with the key, line 7: take off" };
+    assert_eq!(line.heard(), [(0, format!("{notice:?}"))]);
 }
 
 #[test]

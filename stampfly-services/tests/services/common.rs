@@ -6,7 +6,7 @@ use stampfly_flight::console::{self, CommandError, SensorLine};
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
-use stampfly_services::{Cockpit, Connection, Lease, Places, Refusal, Request, Seat, View};
+use stampfly_services::{Cockpit, Connection, Lease, Places, Refusal, Request, Seat, Told, View};
 use stampfly_types::messages::{
     CommandSource, FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity,
 };
@@ -127,6 +127,7 @@ pub struct Vehicle {
     pub steered: Vec<PilotInput>,
     pub alive: Vec<Seat>,
     pub requests: Vec<Request>,
+    pub told: Vec<Told>,
 }
 
 impl Vehicle {
@@ -142,6 +143,7 @@ impl Vehicle {
             steered: Vec::new(),
             alive: Vec::new(),
             requests: Vec::new(),
+            told: Vec::new(),
         };
         vehicle.status(|status| status.phase = FlightPhase::IdleGround);
         let valid = Validity::TILT | Validity::POSITION_XY | Validity::POSITION_Z;
@@ -190,6 +192,9 @@ impl Cockpit for Vehicle {
     fn connection(&mut self) -> Connection {
         self.connections += 1;
         self.connections
+    }
+    fn told(&self, after: u32) -> Option<(u32, Told)> {
+        self.told.get(after as usize).map(|told| (after + 1, *told))
     }
     fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
         self.lease.leave(has_left);

@@ -1,4 +1,4 @@
-//! Who commands, whichever way they come: pages, programs, stations with the key, transmitters.
+//! Who commands: pages, programs, stations with the key and transmitters under one rule.
 
 use stampfly_services::{Asked, Helm, Passed, Refusal, Seat, Told};
 use stampfly_types::Instant;
@@ -88,7 +88,7 @@ impl Scene {
 }
 
 #[test]
-fn whoever_commands_the_next_is_told_and_whoever_watches_does_not_keep_its_flight_going() {
+fn a_second_commander_is_told_who_commands_and_does_not_keep_the_flight_of_one_that_has_left_going() {
     let seats = [PAGE, STATION, OTHER_STATION, PROGRAM];
     for commander in seats {
         for other in seats.into_iter().filter(|seat| *seat != commander) {

@@ -184,8 +184,9 @@ fn place(
 fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: String<128>) -> Console {
     #[cfg(feature = "wifi")]
     let network = served::Served::new(parts.network);
-    let Parts { memory, health, profile, ends, storage, storage_ends, config, facts, key, link, helm, desk, taken, .. } =
-        *parts;
+    let Parts {
+        memory, health, profile, ends, storage, storage_ends, config, facts, key, link, helm, desk, taken, ..
+    } = *parts;
     let (told, flown) = (Told::new(config.clone()), (config.clone(), false));
     let cable = Cable::new(IDENTITY, fingerprint(&TOPICS, &config));
     Console {
