@@ -103,6 +103,8 @@ impl<'b> Link<'b> {
         bytes: &'f mut [u8],
     ) -> Result<Option<Received<'f>>, NotTaken> {
         let before = self.guarded.session().peer();
+        let is_led = self.status().armed && helm.commander() == Some(Seat::Transmitter);
+        self.guarded.set_led(is_led);
         match self.guarded.receive(at, source, bytes)? {
             Heard::Authentic(received) => Ok(self.obey(helm, at, source, received)),
             Heard::Unauthenticated(input) => {

@@ -154,6 +154,12 @@ impl Helm {
         self.lease.holder(now)
     }
 
+    /// Who has taken the lease of this flight and has not left, heard or not.
+    #[must_use]
+    pub fn commander(&self) -> Option<Seat> {
+        self.lease.commander()
+    }
+
     /// What is to be done now and then, whichever programs are connected: call it at least every
     /// 100 ms.
     pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {

@@ -270,3 +270,34 @@ fn the_paired_transmitter_is_a_seat_and_a_page_that_flies_by_hand_does_not_share
     }
     assert!(was_armed && bench.helm.holder(bench.now) == Some(PAGE));
 }
+
+#[test]
+fn a_station_that_watches_does_not_silence_the_transmitter_that_flies_and_is_refused() {
+    let mut bus = topics::Bus::new();
+    let mut bench = Bench::with_key(&mut bus, Some(OLD), Some(Vehicle::new(key())));
+    let mut station = Station::new(key());
+    bench.pass(6_000, false, &[(OLD, false)]);
+    bench.pass(300, false, &[(OLD, true)]);
+    assert!(bench.armed());
+    talk(&mut bench, &mut station, true);
+    assert!(station.session().is_some());
+    for _ in 0..100 {
+        say_watch(&mut bench, &mut station);
+        assert_eq!(bench.pass(20, false, &[(OLD, true)]), Some(Ok(())));
+    }
+    assert!(bench.armed() && !bench.newest::<SystemAlert>(Id::system_alert).active.contains(Alerts::COMM_LOST));
+    say(&mut bench, &mut station, &Payload::Numbered { number: 1, command: guided(GuidedKind::TakeOff) });
+    assert!(heard(&mut bench, &mut station, 100, |_, _| {}).contains(&"1: the transmitter commands".to_owned()));
+    assert_eq!(bench.pass(20, false, &[(OLD, false)]), Some(Ok(())));
+    bench.pass(200, false, &[(OLD, false)]);
+    assert!(!bench.armed());
+    // On the ground the station is heard, and the transmitter is not.
+    say_watch(&mut bench, &mut station);
+    assert_eq!(bench.pass(20, false, &[(OLD, true)]), Some(Err(NotTaken::Forbidden)));
+}
+
+fn say_watch(bench: &mut Bench<'_>, station: &mut Station) {
+    let watch = Payload::Watch { topic: 3, period: 40 };
+    let mut frame = station.seal(bench.now, &watch, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
+    assert!(matches!(bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame), Ok(Some(_))));
+}

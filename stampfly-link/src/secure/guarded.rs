@@ -17,7 +17,7 @@ use stampfly_types::{Duration, Instant};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Policy {
     /// May control packets without a tag fly the vehicle? Even then, not while an authentic station is heard, and not for the rest of a
-    /// flight in which one was.
+    /// flight in which one was, unless their transmitter [commands](Guarded::set_led).
     pub accept_unauthenticated: bool,
 }
 
@@ -86,6 +86,8 @@ pub struct Guarded {
     armed: bool,
     /// Has a station with the key been heard since the motors may turn? Then nobody else takes over when it falls silent.
     is_claimed: bool,
+    /// Does the paired transmitter command now?
+    is_led: bool,
 }
 
 impl Guarded {
@@ -101,6 +103,7 @@ impl Guarded {
             pairing: false,
             armed: false,
             is_claimed: false,
+            is_led: false,
         }
     }
 
@@ -122,6 +125,12 @@ impl Guarded {
         self.session.set_armed(armed);
         self.armed = armed;
         self.is_claimed &= armed;
+    }
+
+    /// Says whether the paired transmitter commands the armed vehicle now: a station with the key that only watches does not silence it then.
+    /// The caller decides who commands.
+    pub const fn set_led(&mut self, is_led: bool) {
+        self.is_led = is_led;
     }
 
     /// Follows whoever decides whether the motors may turn and whether an unauthenticated transmitter is looked for. Call it
@@ -182,7 +191,8 @@ impl Guarded {
     /// May packets that authenticate nobody be used now?
     fn is_open(&self, now: Instant) -> bool {
         let is_joined = self.vehicle.as_ref().is_some_and(|vehicle| vehicle.is_joined(now));
-        self.policy.accept_unauthenticated && !is_joined && !self.is_claimed
+        let is_another = (is_joined || self.is_claimed) && !(self.is_led && self.armed);
+        self.policy.accept_unauthenticated && !is_another
     }
 
     /// What is to be sent to every station now, see [`Vehicle::transmit`].
