@@ -160,6 +160,21 @@ impl Helm {
         self.lease.commander()
     }
 
+    /// Who has taken the lease of this flight, heard or not, there or not.
+    #[must_use]
+    pub const fn taker(&self) -> Option<Seat> {
+        self.lease.taker()
+    }
+
+    /// Connections have ended. One that had the lease makes room, and everybody is told.
+    pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
+        let holder = self.lease.commander();
+        self.lease.leave(has_left);
+        if let Some(seat) = holder.filter(|_| self.lease.commander().is_none()) {
+            self.tell(self.asked, Told { seat, what: Asked::Left });
+        }
+    }
+
     /// What is to be done now and then, whichever programs are connected: call it at least every
     /// 100 ms.
     pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {
@@ -307,12 +322,7 @@ impl Cockpit for Seated<'_> {
     }
 
     fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
-        let holder = self.helm.lease.commander();
-        self.helm.lease.leave(has_left);
-        if let Some(seat) = holder.filter(|_| self.helm.lease.commander().is_none()) {
-            let at = self.helm.asked;
-            self.helm.tell(at, Told { seat, what: Asked::Left });
-        }
+        self.helm.leave(has_left);
     }
 
     fn told(&self, after: u32) -> Option<(u32, Told)> {

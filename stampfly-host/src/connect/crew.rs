@@ -1,7 +1,7 @@
 //! Who commands a vehicle behind `connect`: which page, and which program.
 //!
 //! At the vehicle's end all pages are one station, and programs of the same system and component
-//! number are one. So this end tells them apart: one page has the [`Lease`], as at the ports of a
+//! number are one. So this end tells them apart: pages ask a [`Helm`], as at the ports of a
 //! simulated vehicle, and numbers belong to the connection that has used them first. What others
 //! say with them does not keep a vehicle in the air whose commander has left.
 
@@ -9,10 +9,10 @@
 
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
-use stampfly_services::{Lease, Refusal, Seat};
+use stampfly_services::{Helm, Passed, Refusal, Seat};
 use stampfly_sim::ask::{Ask, Guided};
 use stampfly_sim::vehicle::Client;
-use stampfly_types::messages::GuidedCommand;
+use stampfly_types::messages::{FlightStatus, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant};
 use std::collections::HashMap;
 
@@ -47,55 +47,68 @@ pub(super) fn ends_a_flight(frame: &MavMessage) -> bool {
 /// Who commands.
 #[derive(Debug, Default)]
 pub(super) struct Crew {
-    lease: Lease,
+    helm: Helm,
     /// Systems and components, who uses them, and when they were last heard.
     numbers: HashMap<[u8; 2], (Client, Instant)>,
-    is_armed: bool,
+    /// The vehicle's newest.
+    status: FlightStatus,
 }
 
 impl Crew {
-    /// May this ask of a page go to the vehicle? `None`: it is to be left out, and needs no answer.
+    /// What goes to the vehicle when a page asks this. `None`: it is to be left out, and needs no answer.
     ///
     /// # Errors
     /// When another page commands.
-    pub fn ask(&mut self, now: Instant, page: u64, ask: &Ask) -> Result<Option<()>, Refusal> {
+    pub fn ask(&mut self, now: Instant, page: u64, ask: &Ask) -> Result<Option<Ask>, Refusal> {
+        self.keep(now);
         let seat = Seat::Page(page as u32);
         match ask {
-            Ask::Guided(Guided::Kill {}) => {}
-            Ask::Guided(guided) => self.lease.ask(now, seat, &GuidedCommand::from(*guided))?,
-            Ask::Sticks(sticks) if sticks.kill => {}
-            Ask::Sticks(_) => return Ok(self.lease.steer(now, seat).ok()),
-            Ask::Alive {} => {
-                self.lease.alive(now, seat);
-                return Ok(self.lease.is_holders(seat).then_some(()));
+            Ask::Guided(guided) => {
+                self.helm.guide(now, seat, GuidedCommand::from(*guided), &mut |_| Ok(()))?;
             }
+            Ask::Sticks(sticks) => {
+                let mut passed = None;
+                // A page sends its sticks as long as it is open, and knows from the commander's name that they do not fly.
+                _ = self.helm.steer(now, seat, &PilotInput::from(*sticks), &self.status, &mut |what| {
+                    passed = Some(what);
+                    Ok(())
+                });
+                return Ok(passed.map(|passed| match passed {
+                    Passed::Sticks(_) => ask.clone(),
+                    // Its arm switch was turned off while another flies.
+                    Passed::Command(_) => Ask::Guided(Guided::Land {}),
+                }));
+            }
+            Ask::Alive {} if !self.helm.alive(now, seat) => return Ok(None),
             _ => {}
         }
-        Ok(Some(()))
+        Ok(Some(ask.clone()))
+    }
+
+    /// Time goes on: the lease ends with the flight.
+    pub fn keep(&mut self, now: Instant) {
+        self.helm.keep(now, self.status.armed, &mut |_| Ok(()));
     }
 
     /// Who commands, as far as it is known here: a page and its number, or in words. Empty when none
     /// does.
     pub fn commander(&self, now: Instant) -> (String, Option<u64>) {
-        match self.lease.holder(now) {
+        match self.helm.holder(now) {
             Some(seat @ Seat::Page(number)) => (seat.to_string(), Some(number.into())),
             // No page had the lease: if the vehicle is led, it is led by a program.
-            _ if self.lease.is_holders(Seat::Console) => ("another program".to_owned(), None),
+            _ if self.helm.taker().is_none() => ("another program".to_owned(), None),
             _ => (String::new(), None),
         }
     }
 
     /// This page is gone.
     pub fn leave(&mut self, page: u64) {
-        self.lease.leave(|seat| seat == Seat::Page(page as u32));
+        self.helm.leave(|seat| seat == Seat::Page(page as u32));
     }
 
-    /// May the vehicle's motors turn? With motors off there is nothing to hold.
-    pub fn see(&mut self, is_armed: bool) {
-        self.is_armed = is_armed;
-        if !is_armed {
-            self.lease.release();
-        }
+    /// The vehicle is in this state. With motors off there is nothing to hold.
+    pub const fn see(&mut self, status: FlightStatus) {
+        self.status = status;
     }
 
     /// Does a frame with this number ask for something that the vehicle must not do late?
@@ -108,7 +121,7 @@ impl Crew {
         let (owner, heard) = self.numbers.entry(numbers).or_insert((program, now));
         // To the vehicle the next one is the same: a sign of life would keep in the air what its
         // commander has left, so that in flight only an order takes over.
-        if *owner != program && now.since(*heard) >= FREE && (!self.is_armed || Self::is_order(id)) {
+        if *owner != program && now.since(*heard) >= FREE && (!self.status.armed || Self::is_order(id)) {
             *owner = program;
         }
         if *owner == program {
@@ -133,7 +146,7 @@ mod tests {
         let (beats, orders) = (HEARTBEAT_DATA::ID, COMMAND_LONG_DATA::ID);
         for is_armed in [false, true] {
             let mut crew = Crew::default();
-            crew.see(is_armed);
+            crew.see(FlightStatus { armed: is_armed, ..FlightStatus::default() });
             let mut may = |ms, number, id| crew.may(Instant::from_millis(ms), program(number), ids, id);
             for ms in (0..5_000).step_by(1_000) {
                 assert!(may(ms, 1, beats) && !may(ms + 500, 2, beats) && !may(ms + 501, 2, orders));
@@ -157,12 +170,14 @@ mod tests {
         let mut crew = Crew::default();
         let (arm, sticks) = (Ask::Guided(Guided::Arm {}), Ask::Sticks(Sticks::default()));
         let at = |seconds| Instant::from_secs(seconds);
-        assert_eq!(crew.ask(at(0), 2, &Ask::Alive {}), Ok(Some(())), "none commands yet");
-        assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(())));
+        assert_eq!(crew.ask(at(0), 2, &Ask::Alive {}), Ok(Some(Ask::Alive {})), "none commands yet");
+        assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(arm.clone())));
+        crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
+        assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(arm.clone())));
         assert_eq!(crew.ask(at(1), 2, &arm), Err(Refusal::Occupied(Seat::Page(1))));
-        for (page, passes) in [(1, Some(())), (2, None)] {
-            assert_eq!(crew.ask(at(1), page, &Ask::Alive {}), Ok(passes));
-            assert_eq!(crew.ask(at(1), page, &sticks), Ok(passes));
+        for (page, passes) in [(1, true), (2, false)] {
+            assert_eq!(crew.ask(at(1), page, &Ask::Alive {}).map(|ask| ask.is_some()), Ok(passes));
+            assert_eq!(crew.ask(at(1), page, &sticks).map(|ask| ask.is_some()), Ok(passes));
         }
         crew.leave(1);
         for seconds in 2..20 {
@@ -171,10 +186,38 @@ mod tests {
             }
         }
         for stops in [Guided::Kill {}, Guided::Land {}] {
-            assert_eq!(crew.ask(at(20), 2, &Ask::Guided(stops)), Ok(Some(())));
+            assert_eq!(crew.ask(at(20), 2, &Ask::Guided(stops)), Ok(Some(Ask::Guided(stops))));
         }
-        assert_eq!(crew.ask(at(20), 2, &sticks), Ok(Some(())), "it has taken over");
-        crew.see(false);
-        assert_eq!(crew.ask(at(21), 3, &arm), Ok(Some(())));
+        assert_eq!(crew.ask(at(20), 2, &sticks), Ok(Some(sticks)), "it has taken over");
+        crew.see(FlightStatus::default());
+        assert_eq!(crew.ask(at(21), 3, &arm), Ok(Some(arm)));
+    }
+
+    /// A page with sticks sends them as long as it is open.
+    #[test]
+    fn sticks_at_rest_on_one_page_do_not_keep_another_from_arming() {
+        let mut crew = Crew::default();
+        let idle = Ask::Sticks(Sticks::default());
+        for ms in (0..5_000).step_by(20) {
+            assert_eq!(crew.ask(Instant::from_millis(ms), 2, &idle), Ok(Some(idle.clone())));
+        }
+        let now = Instant::from_secs(5);
+        assert_eq!(crew.ask(now, 1, &Ask::Guided(Guided::Arm {})), Ok(Some(Ask::Guided(Guided::Arm {}))));
+        crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
+        let rise = Ask::Guided(Guided::TakeOff { height: 0.5 });
+        assert_eq!(crew.ask(now, 1, &rise), Ok(Some(rise)));
+        assert_eq!(crew.ask(now, 2, &idle), Ok(None), "another commands");
+    }
+
+    #[test]
+    fn an_arm_switch_that_is_turned_off_on_another_page_lands_the_vehicle() {
+        let mut crew = Crew::default();
+        let now = Instant::from_secs(5);
+        assert!(crew.ask(now, 1, &Ask::Guided(Guided::Arm {})).is_ok());
+        crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
+        assert!(crew.ask(now, 1, &Ask::Guided(Guided::Hold {})).is_ok());
+        let sticks = |arm| Ask::Sticks(Sticks { arm, ..Sticks::default() });
+        assert_eq!(crew.ask(now, 2, &sticks(true)), Ok(None));
+        assert_eq!(crew.ask(now, 2, &sticks(false)), Ok(Some(Ask::Guided(Guided::Land {}))));
     }
 }

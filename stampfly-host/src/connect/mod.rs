@@ -215,9 +215,9 @@ impl<V: Vehicle> Ends<V> {
         self.watch.note(topic, at, words);
         let status = || words.try_into().ok().and_then(FlightStatus::from_words);
         if Some(topic) == self.status
-            && let Some(FlightStatus { armed, .. }) = status()
+            && let Some(status) = status()
         {
-            self.crew.see(armed);
+            self.crew.see(status);
         }
         if let Some(log) = &mut self.log {
             log.note(topic, at, words);
@@ -283,6 +283,7 @@ impl<V: Vehicle> Ends<V> {
 
     /// Tells pages who commands, when that has changed.
     fn tell_commander(&mut self, now: stampfly_types::Instant) {
+        self.crew.keep(now);
         let commander = self.crew.commander(now);
         if self.commander.as_ref() != Some(&commander) {
             let (who, page) = commander.clone();
@@ -291,23 +292,29 @@ impl<V: Vehicle> Ends<V> {
         }
     }
 
-    /// May this ask of a page go to the vehicle? Whom it is answered otherwise, is told.
-    fn passes(&mut self, now: stampfly_types::Instant, is_heard: bool, client: PageClient, asked: &Asked) -> bool {
+    /// What of this goes to the vehicle. The page is told why nothing does.
+    fn passed(
+        &mut self,
+        now: stampfly_types::Instant,
+        is_heard: bool,
+        client: PageClient,
+        asked: Asked,
+    ) -> Option<Asked> {
         let why = match self.crew.ask(now, client.number(), &asked.ask) {
             _ if !is_heard && !asked.ask.is_never_late() => NOT_HEARD.to_owned(),
-            Ok(Some(())) => {
-                if let Ask::Guided(guided) = asked.ask {
+            Ok(Some(ask)) => {
+                if let Ask::Guided(guided) = ask {
                     let what = Done::Command(GuidedCommand::from(guided).kind);
                     let text = Told { seat: Seat::Page(client.number() as u32), what }.to_string();
                     self.hub.tell_all(ONLY, &Event::Text { text });
                 }
-                return true;
+                return Some(Asked { ask, ..asked });
             }
-            Ok(None) => return false,
+            Ok(None) => return None,
             Err(refusal) => refusal.to_string(),
         };
-        self.take(Said::Answer(client, asked.clone(), Err(why)));
-        false
+        self.take(Said::Answer(client, asked, Err(why)));
+        None
     }
 }
 
@@ -457,9 +464,7 @@ impl<V: Vehicle> Bridge<V> {
             let is_heard = is_up(station, now) && station.knows_time();
             let wall = ground::now();
             for (client, asked) in ends.hub.asks(ONLY, wall) {
-                if !ends.passes(passed, is_heard, client, &asked) {
-                    continue;
-                }
+                let Some(asked) = ends.passed(passed, is_heard, client, asked) else { continue };
                 // It may have changed them.
                 if matches!(&asked.ask, Ask::Console { line } if line.starts_with("param") || line.starts_with("autotune"))
                 {
