@@ -7,7 +7,7 @@
 //! | the vehicle | whose sticks are passed on |
 //! |---|---|
 //! | is disarmed | those of the source that came first, until it is silent, or another's arm switch is turned on |
-//! | is armed | those of the seat that has the lease |
+//! | is armed | those of the seat that has the lease; if none has it, those of a seat whose arm switch is on, which takes it |
 //! | is armed, and a program commands | also the paired transmitter's: its pilot takes over by acting, as the mode machine decides, and has the lease then |
 //!
 //! A kill is passed on from every source. An arm switch that is turned off in a frame that is not
@@ -72,7 +72,7 @@ impl StickSource {
         let rival = self.source.filter(|source| source.seat != seat && now.since(source.heard) < SILENCE);
         let (rises, falls) = (before == Some(false) && input.arm, before == Some(true) && !input.arm);
         let refused = match (status.armed, rival) {
-            (true, rival) => self.refusal_in_flight(now, seat, status, rival, lease),
+            (true, rival) => self.refusal_in_flight(&frame, status, rival, lease),
             // Its arm switch was seen off: one that is on when its frames begin must not arm.
             (false, Some(rival)) if !rises || rival.arm => Some(rival.seat),
             (false, _) => lease.holder(now).filter(|holder| *holder != seat),
@@ -95,7 +95,7 @@ impl StickSource {
                 }
                 if flies { Verdict::Flies } else { Verdict::Passes }
             }
-            _ if status.armed => Verdict::Flies,
+            _ if status.armed && lease.taker() == Some(seat) => Verdict::Flies,
             _ => Verdict::Passes,
         }
     }
@@ -103,12 +103,12 @@ impl StickSource {
     /// Who keeps these sticks from an armed vehicle.
     fn refusal_in_flight(
         &self,
-        now: Instant,
-        seat: Seat,
+        frame: &Source,
         status: &FlightStatus,
         rival: Option<Source>,
         lease: &mut Lease,
     ) -> Option<Seat> {
+        let Source { seat, heard: now, arm } = *frame;
         match lease.taker() {
             Some(holder) if holder != seat => {
                 // While another's sticks fly, or have flown it last, the transmitter's would keep its flight going.
@@ -118,6 +118,8 @@ impl StickSource {
             }
             None if rival.is_some() => rival.map(|rival| rival.seat),
             _ if seat == Seat::Transmitter => None,
+            // A program has armed it, and is about to command. Sticks that rest with the arm switch off take no lease.
+            None if !arm => None,
             _ => match lease.steer(now, seat) {
                 Err(Refusal::Occupied(holder)) => Some(holder),
                 _ => None,

@@ -203,7 +203,10 @@ mod tests {
         }
         let now = Instant::from_secs(5);
         assert_eq!(crew.ask(now, 1, &Ask::Guided(Guided::Arm {})), Ok(Some(Ask::Guided(Guided::Arm {}))));
+        // The vehicle's state comes later than what was asked.
+        assert_eq!(crew.ask(now, 2, &idle), Ok(None), "another has asked");
         crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
+        assert_eq!(crew.ask(now, 2, &idle), Ok(Some(idle.clone())), "it rests");
         let rise = Ask::Guided(Guided::TakeOff { height: 0.5 });
         assert_eq!(crew.ask(now, 1, &rise), Ok(Some(rise)));
         assert_eq!(crew.ask(now, 2, &idle), Ok(None), "another commands");

@@ -248,3 +248,18 @@ fn sticks_of_a_station_on_the_ground_keep_no_program_from_commanding() {
     }
     assert_eq!(scene.guide(PAGE, GuidedKind::Arm), Ok(()));
 }
+
+/// A page sends its sticks as long as it is open, and a vehicle is armed a moment before its program is known to command.
+#[test]
+fn sticks_whose_arm_switch_is_off_take_no_lease_that_is_free() {
+    for seat in [Seat::Page(2), STATION] {
+        let mut scene = Scene::default();
+        assert_eq!(scene.steer(seat, 0.0, false), Ok(()));
+        scene.status = FlightStatus { armed: true, commander: CommandSource::Guided, ..FlightStatus::default() };
+        scene.pass(20);
+        assert_eq!(scene.steer(seat, 0.0, false), Ok(()), "the mode machine is told that they rest");
+        assert_eq!(scene.helm.holder(scene.now), None);
+        assert_eq!(scene.guide(PAGE, GuidedKind::TakeOff), Ok(()));
+        assert_eq!(scene.steer(seat, 0.0, false), Err(Refusal::Occupied(PAGE)));
+    }
+}
