@@ -244,9 +244,10 @@ impl<V: Vehicle> Ends<V> {
         }
     }
 
-    /// What programs say in MAVLink, frame by frame, so that none lies within another. An order goes
-    /// with the time at which it was said, as far as this end knows.
-    fn programs(&mut self, now: stampfly_types::Instant, station: &mut Station, put: &mut Vec<u8>) {
+    /// Passes on what programs say in MAVLink, frame by frame, so that none lies within another. An
+    /// order goes with the time at which it was said, as far as this end knows. Without a line an
+    /// order is refused.
+    fn programs(&mut self, now: stampfly_types::Instant, station: &mut Station, mut line: Option<&mut Vec<u8>>) {
         let Self { ports, programs, crew, answers, .. } = self;
         ports.receive(None, &mut |client, heard| match heard {
             Heard::Opened => drop(programs.insert(client, Program::new(now))),
@@ -260,17 +261,23 @@ impl<V: Vehicle> Ends<V> {
                     let numbers = [frame.system, frame.component];
                     let order = Crew::is_order(frame.id).then(|| frame.message().ok()).flatten();
                     let ends = order.as_ref().is_some_and(ends_a_flight);
-                    if !crew.may(now, client, numbers, frame.id) && !ends {
+                    let may = crew.may(now, client, numbers, frame.id) || ends;
+                    let is_marked = Crew::is_order(frame.id) && !ends;
+                    // An order without a time would be done whenever a line that is held up lets it through.
+                    let line = line.as_mut().filter(|_| may && (!is_marked || station.knows_time()));
+                    let Some(put) = line else {
+                        let why = if may {
+                            MavResult::MAV_RESULT_TEMPORARILY_REJECTED
+                        } else {
+                            MavResult::MAV_RESULT_NOT_IN_CONTROL
+                        };
                         let mut room = [0; LONGEST];
-                        let answer = order.and_then(|order| refusal(&order, numbers));
+                        let answer = order.and_then(|order| refusal(&order, why, numbers));
                         let answer = answer.and_then(|ack| answers.write(MavlinkVersion::V2, &ack, &mut room));
                         answer.into_iter().for_each(|answer| ports.send(&client, answer));
                         continue;
-                    }
-                    if Crew::is_order(frame.id) && !ends {
-                        if !station.knows_time() {
-                            continue;
-                        }
+                    };
+                    if is_marked {
                         let said = Instant::now();
                         let said = if pulse.is_held() { said.checked_sub(HELD) } else { Some(said) };
                         station.mark(said, put);
@@ -318,14 +325,13 @@ impl<V: Vehicle> Ends<V> {
     }
 }
 
-/// The answer to a command of a program of these numbers, with which another speaks.
-fn refusal(order: &MavMessage, [target_system, target_component]: [u8; 2]) -> Option<MavMessage> {
+/// The answer to a command of a program of these numbers that is not passed on.
+fn refusal(order: &MavMessage, result: MavResult, [target_system, target_component]: [u8; 2]) -> Option<MavMessage> {
     let command = match order {
         MavMessage::COMMAND_LONG(data) => data.command,
         MavMessage::COMMAND_INT(data) => data.command,
         _ => return None,
     };
-    let result = MavResult::MAV_RESULT_NOT_IN_CONTROL;
     let answer = COMMAND_ACK_DATA { command, result, target_system, target_component, ..COMMAND_ACK_DATA::default() };
     Some(MavMessage::COMMAND_ACK(answer))
 }
@@ -440,7 +446,7 @@ impl<V: Vehicle> Bridge<V> {
                 self.ends.take(Said::Answer(client, asked, Err("the line to the vehicle is gone".into())));
             }
             let now = self.now();
-            self.ends.programs(now, &mut self.station, &mut Vec::new());
+            self.ends.programs(now, &mut self.station, None);
             thread::sleep(place::LOOK);
         }
     }
@@ -478,7 +484,7 @@ impl<V: Vehicle> Bridge<V> {
                 ends.crew.leave(page.number());
             }
             ends.tell_commander(passed);
-            ends.programs(passed, station, &mut put);
+            ends.programs(passed, station, Some(&mut put));
             if now.duration_since(looked) >= LOOK {
                 looked = now;
                 let again = now.duration_since(told) >= TOLD;
