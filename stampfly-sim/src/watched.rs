@@ -100,7 +100,7 @@ pub struct Watched<M> {
     pub last: Truth,
     /// The faults, with how often each changed something.
     pub faults: Vec<(String, u64)>,
-    /// The worst end that is acceptable.
+    /// The worst end that is acceptable with these faults; `None` without faults.
     pub expected: Option<Class>,
     /// What the vehicle measures besides.
     pub measured: M,
@@ -175,7 +175,7 @@ impl Spectator {
 #[derive(Debug, Serialize)]
 struct Findings {
     outcome: &'static str,
-    expected: Option<&'static str>,
+    expected: &'static str,
     as_expected: bool,
     violations: Vec<&'static str>,
     faults: Vec<String>,
@@ -260,6 +260,11 @@ impl<M: Measured> Watched<M> {
             Class::Transparent
         }
     }
+
+    /// The worst end that is acceptable. Without faults the mission has to be flown to its end.
+    fn worst(&self) -> Class {
+        self.expected.unwrap_or(Class::Degraded)
+    }
 }
 
 impl<M: Measured> Verdict for Watched<M> {
@@ -267,10 +272,8 @@ impl<M: Measured> Verdict for Watched<M> {
         if self.live {
             return true;
         }
-        match self.expected {
-            Some(worst) => self.class().is_within(worst),
-            None => self.facts().iter().all(|(_, holds)| *holds),
-        }
+        let flown = self.facts().iter().all(|(_, holds)| *holds);
+        self.class().is_within(self.worst()) && (flown || self.expected.is_some())
     }
 
     fn findings(&self) -> impl Serialize {
@@ -278,7 +281,7 @@ impl<M: Measured> Verdict for Watched<M> {
         let acted = self.faults.iter().all(|(_, changes)| *changes > 0);
         Findings {
             outcome: self.class().name(),
-            expected: self.expected.map(Class::name),
+            expected: self.worst().name(),
             as_expected: self.succeeded(),
             violations: if acted { Vec::new() } else { vec![FAULT_ACTED] },
             faults,

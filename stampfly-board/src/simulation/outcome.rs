@@ -52,8 +52,8 @@ pub struct Outcome {
 }
 
 impl Verdict for Outcome {
-    /// Without faults the mission has to be flown; with faults the end has to be acceptable. Either way every invariant has
-    /// to hold.
+    /// The end has to be acceptable, and every invariant to hold. Without faults the mission has to be
+    /// flown to its end as well.
     fn succeeded(&self) -> bool {
         let flown = self.facts().iter().all(|(_, holds)| *holds);
         let Judgement { faults, as_expected, violations, .. } = &self.judgement;
@@ -61,7 +61,7 @@ impl Verdict for Outcome {
             // Other programs may do what no mission does: only the motors are judged.
             return flown;
         }
-        violations.is_empty() && if faults.is_empty() { flown } else { *as_expected }
+        *as_expected && violations.is_empty() && (flown || !faults.is_empty())
     }
 
     fn findings(&self) -> impl Serialize {
@@ -100,9 +100,10 @@ impl Verdict for Outcome {
         let [first, last] = self.battery;
         told.push(format!("largest tilt {:.3} deg", self.worst_tilt_deg));
         told.push(format!("battery {first:.2} V at the start, {last:.2} V at the end"));
-        let Judgement { outcome, expected, violations, faults, .. } = &self.judgement;
-        if !faults.is_empty() {
-            told.push(format!("outcome {outcome}, acceptable up to {expected}"));
+        let Judgement { outcome, reason, expected, violations, .. } = &self.judgement;
+        if !self.live {
+            let colon = if reason.is_empty() { "" } else { ": " };
+            told.push(format!("outcome {outcome}{colon}{reason}; acceptable up to {expected}"));
         }
         if !violations.is_empty() {
             told.push(format!("VIOLATED {}", violations.join(", ")));
@@ -119,12 +120,17 @@ impl Verdict for Outcome {
             let phase = self.phases.last().map_or(FlightPhase::Init, |change| change.phase);
             return format!("flown by other programs, ended as {}", phase.name());
         }
-        let sentence = match (self.metrics.landed, self.metrics.disarmed) {
-            (true, true) => "landed and disarmed",
-            (true, false) => "landed, still armed",
-            (false, _) => "DID NOT LAND",
-        };
-        sentence.into()
+        let Judgement { outcome, reason, as_expected, violations, .. } = &self.judgement;
+        if self.succeeded() {
+            "landed and disarmed".into()
+        } else if !as_expected {
+            format!("{}: {reason}", outcome.to_uppercase())
+        } else if !violations.is_empty() {
+            format!("VIOLATED {}", violations.join(", "))
+        } else {
+            let missed = self.facts().iter().filter(|(_, holds)| !holds).map(|(name, _)| *name).collect::<Vec<_>>();
+            format!("NOT {}", missed.join(", NOT "))
+        }
     }
 }
 

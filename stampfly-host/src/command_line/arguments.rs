@@ -21,7 +21,7 @@ use std::path::PathBuf;
 #[command(
     name = "stampfly",
     version,
-    after_help = "Exit code: 0 when all went well, 1 when a flight or a comparison did not, 2 when the command line was wrong."
+    after_help = "Exit code: 0 when the flight or the comparison ended as it should, 1 when it did not, 2 when the command line, a value or a file was wrong."
 )]
 pub struct Arguments {
     /// What to do; without it, a mission is flown.

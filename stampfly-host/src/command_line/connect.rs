@@ -15,8 +15,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Exit code of a wrong command line.
-const USAGE: u8 = 2;
 /// What a real vehicle can be asked: everything but what a world does. The last two at a cable alone, where a motor can be stopped whatever happens to the radio.
 const OFFERS: &[&str] =
     &["guided", "sticks", "alive", "param_set", "param_get", "param_save", "console", "motor_test", "motor_stop"];
@@ -26,14 +24,8 @@ pub fn run(options: &ConnectOptions) -> Result<ExitCode, Failure> {
     let way = match (&options.place, &options.key) {
         (Some(VehiclePlace::Line(place)), None) => Way::Line(place.clone()),
         (Some(VehiclePlace::Radio(place)), Some(file)) => Way::Radio(place.clone(), Key::read(file)?.sealing()?),
-        (None, None) => match port_of(None) {
-            Some(path) => Way::Line(Place::Serial(path)),
-            None => return Ok(ExitCode::from(USAGE)),
-        },
-        _ => {
-            errln!("stampfly: a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does");
-            return Ok(ExitCode::from(USAGE));
-        }
+        (None, None) => Way::Line(Place::Serial(port_of(None)?)),
+        _ => return Err("a vehicle in a network, udp:HOST, wants its '--key FILE', and no other does".into()),
     };
     vehicles::with(&options.vehicle.name, Connect(options, way))?
 }

@@ -13,8 +13,6 @@ use std::time::{Duration, Instant};
 
 /// A vehicle that was plugged in has its port by then.
 const PLUGGED_IN: Duration = Duration::from_secs(15);
-/// Exit code of a wrong command line.
-const USAGE: u8 = 2;
 
 pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
     if options.list_faults {
@@ -26,46 +24,40 @@ pub fn run(options: &DoctorOptions) -> Result<ExitCode, Failure> {
             let all = fault::all();
             let fault = all.iter().find(|fault| fault.name == *name);
             if fault.is_none() && !name.is_empty() {
-                errln!("stampfly: there is no fault '{name}'; --list-faults lists them");
-                return Ok(ExitCode::from(USAGE));
+                return Err(format!("there is no fault '{name}'; --list-faults lists them").into());
             }
             emulated::examine(fault.map(|fault| &fault.defect), options.seed)
         }
-        None => match vehicle(options)? {
-            Some(chart) => chart,
-            None => return Ok(ExitCode::from(USAGE)),
-        },
+        None => vehicle(options)?,
     };
     std::fs::write(&options.out, chart.file()).map_err(|error| format!("{}: {error}", options.out.display()))?;
     outln!("\n{chart}Everything is in {}; send it with a report.", options.out.display());
     Ok(if chart.findings().next().is_none() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The vehicle's serial port: the one that was typed, or the only one that looks like it. Says so when nobody can tell.
-pub fn port_of(typed: Option<&str>) -> Option<String> {
+/// The vehicle's serial port: the one that was typed, or the only one that looks like it.
+pub fn port_of(typed: Option<&str>) -> Result<String, Failure> {
     match (typed, Serial::candidates().as_slice()) {
-        (Some(path), _) => Some(path.into()),
-        (None, [only]) => Some(only.clone()),
+        (Some(path), _) => Ok(path.into()),
+        (None, [only]) => Ok(only.clone()),
         (None, found) => {
             let found = if found.is_empty() { "none is there".into() } else { found.join(", ") };
-            errln!("stampfly: which port is the vehicle's? --port PORT; {found}");
-            None
+            Err(format!("which port is the vehicle's? --port PORT; {found}").into())
         }
     }
 }
 
-/// Examines the vehicle at a serial port. `None` when the propellers are on, or nobody can tell which port it is.
-fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
+/// Examines the vehicle at a serial port, once its propellers are off.
+fn vehicle(options: &DoctorOptions) -> Result<Chart, Failure> {
     if !options.yes {
         outln!("Take all four propellers off. Type off when they are.");
         let mut typed = String::new();
         stdin().lock().read_line(&mut typed)?;
         if typed.trim() != "off" {
-            errln!("stampfly: with propellers on it is not examined");
-            return Ok(None);
+            return Err("with propellers on it is not examined".into());
         }
     }
-    let Some(path) = port_of(options.port.as_deref()) else { return Ok(None) };
+    let path = port_of(options.port.as_deref())?;
     let mut newcomer = Newcomer {
         connect: |path| Serial::open(path, PLUGGED_IN),
         path,
@@ -77,5 +69,5 @@ fn vehicle(options: &DoctorOptions) -> Result<Option<Chart>, Failure> {
     };
     let mut chart = examine(&mut newcomer);
     chart.transcript = newcomer.transcript;
-    Ok(Some(chart))
+    Ok(chart)
 }

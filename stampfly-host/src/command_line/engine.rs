@@ -4,7 +4,7 @@
 
 use crate::campaign::case::shell_line;
 use crate::campaign::shard::Shard;
-use crate::command_line::failure::Failure;
+use crate::command_line::failure::{Failure, Unfinished};
 use serde_json::json;
 use std::ffi::OsStr;
 use std::io::{Read, Write};
@@ -72,8 +72,8 @@ pub fn hq(job: &Job, shards: &[Shard], done: &dyn Fn(&[Shard])) -> Result<(), Fa
             let said = said.trim();
             let error = std::fs::read_to_string(error_file(job, *first)).unwrap_or_default();
             let why = [said, error.trim()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n");
-            Err(format!("HyperQueue ended ({status}) with {missing} of {all} shards missing, the first {first}\n{why}")
-                .into())
+            let text = format!("HyperQueue ended ({status}) with {missing} of {all} shards missing, the first {first}\n{why}");
+            Err(Unfinished(text).into())
         }
     }
 }

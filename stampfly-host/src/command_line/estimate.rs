@@ -1,8 +1,8 @@
-//! `stampfly estimate`: the estimator over recorded data. Exit code 1 when a file could not be used.
+//! `stampfly estimate`: the estimator over recorded data. Exit code 2 when a file could not be used.
 
 use crate::Report;
 use crate::command_line::arguments::EstimateOptions;
-use crate::command_line::failure::Failure;
+use crate::command_line::failure::{Failure, UNUSABLE};
 use crate::command_line::terminal;
 use crate::report::Metric;
 use serde::Serialize;
@@ -45,7 +45,7 @@ pub fn run(options: &EstimateOptions) -> Result<ExitCode, Failure> {
     } else if !rows.is_empty() {
         outln!("{}", table(&rows));
     }
-    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if failed { ExitCode::from(UNUSABLE) } else { ExitCode::SUCCESS })
 }
 
 fn one(file: &Path, options: &EstimateOptions) -> Result<Figures, Failure> {

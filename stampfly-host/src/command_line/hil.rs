@@ -2,7 +2,7 @@
 
 use crate::command_line::arguments::HilOptions;
 use crate::command_line::doctor::port_of;
-use crate::command_line::failure::Failure;
+use crate::command_line::failure::{Failure, Unfinished};
 use crate::command_line::fly::{self, figures, fly_and_write, print_screen};
 use crate::hil::emulated::{Pipe, start};
 use crate::hil::program::Program;
@@ -15,13 +15,9 @@ use stampfly_sim::vehicle::{Figures, Port, Remote, Settings, Vehicle, Verdict};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Exit code of a wrong command line.
-const USAGE: u8 = 2;
-
 pub fn run(options: &HilOptions) -> Result<ExitCode, Failure> {
     if options.fly.from.is_some() {
-        errln!("stampfly: a flight of a campaign is flown again here: stampfly fly --from");
-        return Ok(ExitCode::from(USAGE));
+        return Err("a flight of a campaign is flown again here: stampfly fly --from".into());
     }
     if options.fly.scene.list {
         return fly::run(&options.fly);
@@ -33,10 +29,7 @@ pub fn run(options: &HilOptions) -> Result<ExitCode, Failure> {
             start::<Runnables>(there);
             Box::new(here)
         }
-        None => match port_of(options.port.as_deref()) {
-            Some(path) => Box::new(hil::serial::open(&path)?),
-            None => return Ok(ExitCode::from(USAGE)),
-        },
+        None => Box::new(hil::serial::open(&port_of(options.port.as_deref())?)?),
     };
     vehicles::with(&options.fly.scene.vehicle.name, Hil(options, &mut *port))?
 }
@@ -55,7 +48,8 @@ impl ForVehicle for Hil<'_> {
             fly_and_write::<V>(options, &typed, options.seed, &setup, |setup, mut recorder, report| {
                 let settings = Settings { real_time: *real_time, ..Settings::default() };
                 let mut remote = Remote::new(port, settings);
-                let flown = hil::fly::<V>(setup, &mut remote, &mut recorder, report)?;
+                let flown = hil::fly::<V>(setup, &mut remote, &mut recorder, report)
+                    .map_err(|error| Unfinished(error.to_string()))?;
                 said = remote.figures().clone();
                 Ok((flown, recorder))
             })?;

@@ -224,7 +224,7 @@ fn the_golden_flight_is_what_it_should_be() {
     assert_eq!(again.code, 0, "{}", again.err);
     let recorded = std::fs::read(folder.join("again.bin")).expect("recorded");
     assert!(recorded == stampfly_board::golden::FLIGHT, "recorded differently: `cargo xtask golden --fix`");
-    assert_eq!(run(&folder, &["golden", "--record", "no/such/folder"]).code, 1);
+    assert_eq!(run(&folder, &["golden", "--record", "no/such/folder"]).code, 2);
 }
 
 #[test]
@@ -243,10 +243,10 @@ fn help_is_everywhere() {
     assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 0, "nothing was flown");
 }
 
-/// Exit code not zero, nothing on standard output, and all of these words on standard error.
+/// Exit code 2, nothing on standard output, and all of these words on standard error.
 fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
     let ran = run(folder, arguments);
-    assert_ne!(ran.code, 0, "{arguments:?} is accepted: {}", ran.out);
+    assert_eq!(ran.code, 2, "{arguments:?}: {}{}", ran.out, ran.err);
     assert_eq!(ran.out, "", "{arguments:?}");
     for word in words {
         assert!(ran.err.contains(word), "{arguments:?}: no '{word}' in: {}", ran.err);

@@ -255,7 +255,7 @@ fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_
     assert_eq!(code(&["/dev/there-is-none"]), Some(1));
     assert_eq!(code(&["tcp:nowhere"]), Some(2));
     assert_eq!(code(&["/dev/null", "--baud", "12"]), Some(2));
-    assert_eq!(code(&["/dev/null", "--port", "tello=1"]), Some(1), "as of serve");
+    assert_eq!(code(&["/dev/null", "--port", "tello=1"]), Some(2), "as of serve");
 }
 
 #[test]

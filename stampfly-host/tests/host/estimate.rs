@@ -43,7 +43,7 @@ fn a_broken_file_does_not_stop_the_others() {
     let files = [&empty, &strange, &number, &header, &archive, &missing, &good].map(PathBuf::as_path);
     let output = stampfly(&[&files[..], &[Path::new("--json")]].concat());
     let errors = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert_eq!(output.status.code(), Some(2), "{errors}");
     let expected = [
         "empty.csv: no known kind",
         "strange.csv: no known kind of recording begins with `when,what`",
@@ -104,7 +104,7 @@ fn a_wrong_option_is_named() {
         [("eskf.gate=a", "'a' is no number"), ("eskf.gat=1", "eskf.gat=1"), ("gate", "NAME=VALUE")]
     {
         let output = stampfly(&[&file, Path::new("--param"), Path::new(option)]);
-        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(output.status.code(), Some(2));
         assert!(text(&output.stderr).contains(expected), "{}", text(&output.stderr));
     }
     let output = stampfly(&[]);

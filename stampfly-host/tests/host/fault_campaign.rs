@@ -295,7 +295,7 @@ fn shards_and_one_run_give_the_same_rows() {
 
     // Nothing of another campaign is overwritten.
     let other = stampfly(&here, &["campaign", "--faults", "--flights", "9", "--seed", "2", "--out", "one"]);
-    assert!(other.code == 1 && other.err.contains("is of another campaign: plan"), "{}", other.err);
+    assert!(other.code == 2 && other.err.contains("is of another campaign: plan"), "{}", other.err);
 
     // A flight again from its row; a row that was changed is noticed.
     let again =
@@ -309,7 +309,7 @@ fn shards_and_one_run_give_the_same_rows() {
     let changed = again("changed.parquet", "1");
     assert_eq!((changed.code, json(&changed)["same"].as_bool()), (1, Some(false)));
     let beyond = again("changed.parquet", "3");
-    assert!(beyond.code == 1 && beyond.err.contains("has rows 0 to 1"), "{}", beyond.err);
+    assert!(beyond.code == 2 && beyond.err.contains("has rows 0 to 1"), "{}", beyond.err);
 }
 
 #[test]
@@ -441,7 +441,7 @@ fn mistakes_are_named() {
     alone.current_dir(&here).env("PATH", &here).args(["campaign", "--faults", "--flights", "1", "--engine", "hq"]);
     let alone = alone.output().expect("the program starts");
     let said = String::from_utf8_lossy(&alone.stderr).into_owned();
-    assert!(alone.status.code() == Some(1) && said.contains("--engine hq needs HyperQueue in PATH"), "{said}");
+    assert!(alone.status.code() == Some(2) && said.contains("--engine hq needs HyperQueue in PATH"), "{said}");
 }
 
 #[test]

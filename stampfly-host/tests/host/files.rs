@@ -82,7 +82,7 @@ fn a_topic_that_is_not_there_is_a_failure() {
     std::fs::write(folder.join("px4.ulg"), px4_like()).expect("written");
     for command in ["csv", "mcap"] {
         let output = log(&folder, &[command, "px4.ulg", "--topic", "battery_status"]);
-        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(output.status.code(), Some(2));
         assert!(text(&output).contains("px4.ulg: no topic `battery_status`"), "{}", text(&output));
     }
     let output = log(&folder, &["csv", "px4.ulg", "--topic", "position_setpoint_triplet", "--topic", "sensor_accel"]);
@@ -149,7 +149,7 @@ fn one_bad_table_costs_itself_alone() {
     std::fs::write(folder.join("px4.ulg"), px4_like()).expect("written");
     std::fs::create_dir(folder.join("px4_esc_status_0.csv")).expect("a folder in the way");
     let output = log(&folder, &["csv", "px4.ulg"]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     assert!(text(&output).contains("px4_esc_status_0.csv: "), "{}", text(&output));
     assert_eq!(names(&folder).len(), 5, "{:?}", names(&folder));
 }
@@ -167,7 +167,7 @@ fn small_files_that_claim_much_cost_little_time_and_memory() {
         assert!(output.status.success(), "{what}: {}", text(&output));
         let began = Instant::now();
         let output = bounded(&["replay", "hostile.ulg"]).current_dir(&folder).output().expect("it runs");
-        assert_eq!(output.status.code(), Some(1), "{what}: {}", text(&output));
+        assert_eq!(output.status.code(), Some(2), "{what}: {}", text(&output));
         assert!(text(&output).contains("no activations") && began.elapsed() < PATIENCE, "{what}: {}", text(&output));
     }
 }

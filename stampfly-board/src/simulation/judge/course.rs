@@ -5,7 +5,7 @@ use stampfly_types::Vec3;
 use std::vec::Vec;
 
 /// The vehicle has been at a place of the mission that it came as near as this, m.
-const VISITED: f32 = 1.0;
+pub(super) const VISITED: f32 = 1.0;
 
 /// The path of a mission, and which of its places the vehicle has been at.
 pub(super) struct Course {
@@ -30,6 +30,11 @@ impl Course {
     /// Does the mission ask for landing, or for nothing any more, when so many steps are done?
     pub fn asks_to_land(&self, done: usize) -> bool {
         self.steps.get(done).is_none_or(|step| *step == Step::Land)
+    }
+
+    /// Does the mission ever ask to take off?
+    pub fn asks_to_rise(&self) -> bool {
+        self.steps.iter().any(|step| matches!(step, Step::TakeOff { .. }))
     }
 
     /// The vehicle is here.

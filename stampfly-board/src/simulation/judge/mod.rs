@@ -1,6 +1,7 @@
-//! What came of a flight: how it ended, and whether anything happened that never may.
+//! What came of a flight: how it ended and why, and whether anything happened that never may.
 //!
-//! The first line that fits is the end of the flight. *After the fault* is after the first fault began, and the whole of a
+//! The first line that fits is the end of the flight. Faults name the worst end that is acceptable; without
+//! faults it is `degraded`: the mission was flown to its end. *After the fault* is after the first fault began, and the whole of a
 //! flight without one; lengths and speeds are the truth's.
 //!
 //! | end | rule |
@@ -10,7 +11,7 @@
 //! | `kept-on` | the motors were on at the end |
 //! | `cut` | the motors stopped for good within 0.3 s of the fault, of several one for which they are to stop, or of a blow of a wall or a ceiling, and not on the ground at the end of the mission |
 //! | `crashed` | after the fault it touched the ground faster than 1 m/s, or tilted by more than 20° with its motors on, or lies so at the end; once the motors have stopped, what one that cannot be stopped does to it is not counted, nor that a hand drops what has landed in it |
-//! | `landed` | it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
+//! | `landed` | it never left the ground; it began to land, or its motors stopped, before the mission asked for landing; or it was not within 1 m of a place of the mission |
 //! | `degraded` | after the fault an alert, another flight mode, 0.15 m above the highest commanded height, or 0.5 m beside the path |
 //! | `transparent` | anything else |
 //!
@@ -27,7 +28,7 @@ mod sight;
 
 use super::mission::Mission;
 use crate::topics::Id;
-use course::Course;
+use course::{Course, VISITED};
 pub use invariants::Invariants;
 use moments::Moments;
 use serde::Serialize;
@@ -37,6 +38,8 @@ use stampfly_sim::Truth;
 use stampfly_sim::fault::{Class, FAULT_ACTED, Injector};
 use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, SystemAlert};
 use stampfly_types::{Duration, FieldKind, Instant, Message, frame};
+use std::collections::BTreeSet;
+use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
@@ -90,6 +93,8 @@ pub struct FaultSpan {
 pub struct Judgement {
     /// How it ended; see the [module](self) documentation.
     pub outcome: &'static str,
+    /// Why it is no better end: a sentence without a capital letter, empty for `transparent`.
+    pub reason: String,
     /// The worst end that is acceptable.
     pub expected: &'static str,
     /// Is the end no worse than that?
@@ -119,6 +124,8 @@ struct Touch {
     at: Instant,
     speed: f32,
     tilt: f32,
+    /// The vehicle was landing.
+    landing: bool,
 }
 
 pub(super) struct Judge {
@@ -159,7 +166,8 @@ pub(super) struct Judge {
     runs_on: bool,
     mode: Option<FlightMode>,
     other_mode: bool,
-    new_alert: bool,
+    /// Alerts after the fault; without one, since the motors turned.
+    new_alerts: BTreeSet<&'static str>,
     /// Steps of the mission that are done.
     done: usize,
 }
@@ -204,7 +212,7 @@ impl Judge {
             runs_on: false,
             mode: None,
             other_mode: false,
-            new_alert: false,
+            new_alerts: BTreeSet::new(),
             done: 0,
         }
     }
@@ -230,7 +238,9 @@ impl Judge {
             if is && !was {
                 self.spans.push(AlertSpan { name, since: seconds, until: None });
                 // Before the first command nobody has been heard, and sensors start.
-                self.new_alert |= after_fault && (self.turned || self.injector.faults().next().is_some());
+                if after_fault && (self.turned || self.injector.faults().next().is_some()) {
+                    self.new_alerts.insert(name);
+                }
             } else if was
                 && !is
                 && let Some(span) = self.spans.iter_mut().rev().find(|span| span.name == name)
@@ -286,10 +296,10 @@ impl Judge {
         self.moments.tell(&self.injector, sight, self.motors_on, landing && self.in_air, landing && touches);
 
         let after_fault = self.has_begun(now);
-        if touches && (after_fault && self.injector.faults().next().is_some() || landing) {
+        if touches {
             // A leg that touches first turns over what its propellers push, and sets upright what they no longer do.
             let tilt = if self.motors_on { frame::tilt(&truth.attitude).to_degrees() } else { 0.0 };
-            self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt });
+            self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt, landing });
         }
         self.course.visit(&truth.position);
         let (top, beside) = self.course.commanded(done, &truth.position);
@@ -338,18 +348,19 @@ impl Judge {
             })
             .collect();
         self.invariants.require(FAULT_ACTED, faults.iter().all(|span| span.since.is_some() && span.changes > 0));
-        let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Transparent);
-        let outcome = self.class(begun);
+        let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Degraded);
+        let (outcome, reason) = self.end(begun);
         // Motors that were off already stayed off from the beginning of the fault.
         let stopped = if self.turned { self.stopped } else { Some((self.now, 0.0)) };
         let stopped = begun.zip(stopped).map(|(begun, (at, height))| {
             let at = if self.turned { at } else { begun };
             (at.since(begun).seconds_f64(), f64::from(height.max(0.0)))
         });
-        let touch = self.touches.iter().find(|touch| begun.is_none_or(|begun| touch.at >= begun));
+        let touch = self.touches.iter().find(|touch| begun.map_or(touch.landing, |begun| touch.at >= begun));
         let [above, _] = self.away;
         Judgement {
             outcome: outcome.name(),
+            reason,
             expected: expected.name(),
             as_expected: outcome.is_within(expected) && (count > 0 || outcome != Class::Refused),
             violations: self.invariants.violations().collect(),
@@ -384,39 +395,93 @@ impl Judge {
         })
     }
 
-    /// By the table of the [module](self) documentation.
-    fn class(&self, begun: Option<Instant>) -> Class {
+    /// By the table of the [module](self) documentation, with the reason.
+    fn end(&self, begun: Option<Instant>) -> (Class, String) {
+        if !self.turned {
+            return (Class::Refused, "the motors never turned".into());
+        }
         let [above, beside] = self.away;
-        let wide = self.wide;
+        if above > AWAY[0] {
+            return (Class::FlownAway, format!("{above:.1} m above the highest height that was commanded"));
+        }
+        if beside > AWAY[1] {
+            return (Class::FlownAway, format!("{beside:.1} m beside the path that was commanded"));
+        }
+        if self.motors_on {
+            return (Class::KeptOn, "the motors were on at the end".into());
+        }
+        let crash = self.crash(begun);
+        if let Some((at, height)) = self.stopped {
+            let at_the_end = !self.stopped_early && height <= OFF_GROUND && crash.is_none();
+            if !at_the_end && (self.stopped_by_fault(at) || self.stopped_by_blow) {
+                return (Class::Cut, format!("the motors stopped at {:.1} m{}", height.max(0.0), self.alerts_at(at)));
+            }
+        }
+        if let Some(reason) = crash {
+            return (Class::Crashed, reason);
+        }
+        if let Some(reason) = self.shortfall() {
+            return (Class::Landed, reason);
+        }
+        let too_far = |error: f32, bound: f32| error > self.wide * bound;
+        let reason = if !self.new_alerts.is_empty() {
+            format!("alerts{}", listed(&self.new_alerts))
+        } else if self.other_mode {
+            "another mode than at the start".into()
+        } else if too_far(above, EXACT[0]) {
+            format!("{above:.2} m above the highest height that was commanded")
+        } else if too_far(beside, EXACT[1]) {
+            format!("{beside:.2} m beside the path that was commanded")
+        } else {
+            return (Class::Transparent, String::new());
+        };
+        (Class::Degraded, reason)
+    }
+
+    /// Why the flight is a crash, if it is one.
+    fn crash(&self, begun: Option<Instant>) -> Option<String> {
         let from = begun.or(self.start).unwrap_or(self.now);
         let given_up = self.runs_on || self.is_caught();
         let until = self.stopped.filter(|_| given_up).map_or(self.now, |(at, _)| at);
-        let counts = |touch: &Touch| (from..=until).contains(&touch.at);
-        let hard = |touch: &Touch| counts(touch) && (touch.speed > HARD || touch.tilt > TILTED);
-        let lies = !given_up
-            && self.last.is_some_and(|truth| truth.contact && frame::tilt(&truth.attitude).to_degrees() > TILTED);
-        let crashed = lies || self.touches.iter().any(hard);
-        if !self.turned {
-            Class::Refused
-        } else if above > AWAY[0] || beside > AWAY[1] {
-            Class::FlownAway
-        } else if self.motors_on {
-            Class::KeptOn
-        } else if self.stopped.is_some_and(|(at, height)| {
-            let at_the_end = !self.stopped_early && height <= OFF_GROUND && !crashed;
-            !at_the_end && (self.stopped_by_fault(at) || self.stopped_by_blow)
-        }) {
-            Class::Cut
-        } else if crashed {
-            Class::Crashed
-        } else if self.early || self.stopped_early || !self.course.is_visited() {
-            Class::Landed
-        } else if self.new_alert || self.other_mode || above > wide * EXACT[0] || beside > wide * EXACT[1] {
-            Class::Degraded
+        let mut touches = self.touches.iter().filter(|touch| (from..=until).contains(&touch.at));
+        let hard = |touch: &&Touch| touch.speed > HARD || touch.tilt > TILTED;
+        if let Some(Touch { at, speed, tilt, .. }) = touches.find(hard) {
+            let how = if *speed > HARD { format!("at {speed:.1} m/s") } else { format!("tilted by {tilt:.0} deg") };
+            return Some(format!("touched the ground {how}{}", self.alerts_at(*at)));
+        }
+        let lies = self.last.filter(|truth| !given_up && truth.contact)?;
+        let tilt = frame::tilt(&lies.attitude).to_degrees();
+        (tilt > TILTED).then(|| format!("lies tilted by {tilt:.0} deg{}", self.alerts_at(self.now)))
+    }
+
+    /// Why the mission was not flown to its end, if it was not.
+    fn shortfall(&self) -> Option<String> {
+        let stopped = self.stopped.map_or(self.now, |(at, _)| at);
+        if self.course.asks_to_rise() && self.highest < OFF_GROUND {
+            Some(format!("never left the ground{}", self.alerts_at(stopped)))
+        } else if self.early {
+            Some(format!("landed before the mission asked for it{}", self.alerts_at(stopped)))
+        } else if self.stopped_early {
+            Some(format!("the motors stopped before the mission asked for landing{}", self.alerts_at(stopped)))
+        } else if !self.course.is_visited() {
+            Some(format!("was not within {VISITED} m of each place of the mission"))
         } else {
-            Class::Transparent
+            None
         }
     }
+
+    /// Names of the alerts that spoke until this instant and were not over a second before, behind a colon.
+    fn alerts_at(&self, at: Instant) -> String {
+        let at = at.seconds_f64();
+        let spoke = |span: &&AlertSpan| span.since <= at && span.until.is_none_or(|until| until >= at - 1.0);
+        listed(&self.spans.iter().filter(spoke).map(|span| span.name).collect())
+    }
+}
+
+/// Names behind a colon; nothing without names.
+fn listed(names: &BTreeSet<&'static str>) -> String {
+    let names: Vec<_> = names.iter().copied().collect();
+    if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) }
 }
 
 fn height(truth: &Truth) -> f32 {
