@@ -156,6 +156,14 @@ impl MotorStage {
         self.voltage.unwrap_or(self.config.nominal_voltage)
     }
 
+    /// What a motor can push with at its largest duty and the voltage in use, N: the limit for
+    /// [`MultirotorMixer::mix_within`](crate::MultirotorMixer::mix_within) in the next step.
+    #[inline]
+    #[must_use]
+    pub fn thrust_max(&self) -> f32 {
+        self.config.curve.thrust(self.config.duty_max * self.battery_voltage())
+    }
+
     fn battery(&mut self, reading: Option<f32>, dt: f32) -> f32 {
         let plausible = reading.filter(|v| (self.config.lowest_voltage..=self.config.highest_voltage).contains(v));
         let before = self.voltage.or(plausible).unwrap_or(self.config.nominal_voltage);

@@ -5,7 +5,7 @@ use crate::config::VehicleConfig;
 use crate::console::TEST_DUTY;
 use crate::topics::ActuationEnds;
 use stampfly_bus::{Activation, Runnable};
-use stampfly_control::{Mixer, MotorStage, MultirotorMixer};
+use stampfly_control::{MotorStage, MultirotorMixer};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
 
@@ -44,7 +44,7 @@ impl Runnable for Actuation {
             self.armed_at = now;
         }
         let voltage = ends.sensor_power.fresh(now, STALE_POWER).map(|power| power.voltage);
-        let mixed = self.mixer.mix(&demand.unwrap_or_default());
+        let mixed = self.mixer.mix_within(&demand.unwrap_or_default(), self.motors.thrust_max());
         // A write to flash stops both cores: duties would stay as they are, so they are zero before it begins.
         let is_still = ends.storage_busy.get().busy;
         let mut output = self.motors.step(now, &mixed, voltage, armed && demand.is_some() && !is_still);

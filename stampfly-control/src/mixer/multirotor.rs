@@ -96,14 +96,44 @@ impl MultirotorMixer {
         if low < high { Ok(Self { thrust_min, ..self }) } else { Err(GeometryError::Uncontrollable) }
     }
 
+    /// Distributes the demand over motors that push with at most `available` N each in this step, as a battery under load
+    /// lets them: [`MotorStage::thrust_max`](crate::MotorStage::thrust_max). More than the airframe's own limit counts as that.
+    ///
+    /// A limit that only the output stage knows cuts the motors that push hardest, all to the same duty, and with them
+    /// roll and pitch.
+    ///
+    /// ```
+    /// use stampfly_control::{Airframe, MultirotorMixer};
+    /// use stampfly_types::{Vec3, messages::ControlOutput};
+    /// let mixer = MultirotorMixer::for_airframe(&Airframe::EXAMPLE)?;
+    /// let demand = ControlOutput { thrust: 9.0, torque: Vec3::new(0.05, 0.0, 0.0) };
+    /// let mixed = mixer.mix_within(&demand, 1.5);
+    /// let [front_right, rear_right, rear_left, front_left, ..] = mixed.thrust;
+    /// assert!(front_left <= 1.5 && rear_left <= 1.5);
+    /// assert!(front_right < front_left && rear_right < rear_left, "it still rolls to the right");
+    /// assert_eq!(mixed.unmet[0], 0.0);
+    /// assert!(mixed.unmet[3] > 0.3, "a third of the thrust is missing");
+    /// # Ok::<(), stampfly_control::GeometryError>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn mix_within(&self, demand: &ControlOutput, available: f32) -> Mixed {
+        let most = if available < self.thrust_max { available } else { self.thrust_max };
+        // Motors that idle push, however empty the battery is.
+        let limits =
+            Limits { least: self.thrust_min, most: if most > self.thrust_min { most } else { self.thrust_min } };
+        // The usual number of motors as a constant: no loop is left of it.
+        if self.count == 4 { self.spread(4, demand, limits) } else { self.spread(self.count, demand, limits) }
+    }
+
     /// Distributes the demand over `count` motors.
     #[inline(always)]
-    fn spread(&self, count: usize, demand: &ControlOutput) -> Mixed {
+    fn spread(&self, count: usize, demand: &ControlOutput, limits: Limits) -> Mixed {
         // Far beyond any airframe, and small enough that no product below overflows.
         let number = |value: f32| if value.is_finite() { symmetric(value, 1e6) } else { 0.0 };
         let wanted = number(demand.thrust);
         let (roll, pitch, yaw) = (number(demand.torque.x), number(demand.torque.y), number(demand.torque.z));
-        let (shares, least, most) = (&self.shares, self.thrust_min, self.thrust_max);
+        let (shares, Limits { least, most }) = (&self.shares, limits);
 
         let mut tilt = [0.0; MAX_MOTORS];
         // Roll and pitch add nothing to the sum of all thrusts.
@@ -116,7 +146,7 @@ impl MultirotorMixer {
         }
         let (mut collective, mut tilt_scale, mut unmet_thrust) = (wanted, 1.0, 0.0);
         if !fits {
-            (collective, tilt_scale) = self.compromise(tilt, wanted);
+            (collective, tilt_scale) = self.compromise(tilt, wanted, limits);
             tilt.iter_mut().for_each(|part| *part *= tilt_scale);
             unmet_thrust = symmetric((wanted - collective) / wanted.abs().max(1e-3), 1.0);
         }
@@ -132,7 +162,7 @@ impl MultirotorMixer {
         }
         let mut yaw_scale = 1.0;
         if !fits {
-            yaw_scale = self.yaw_scale(thrust, twist);
+            yaw_scale = self.yaw_scale(thrust, twist, limits);
             twist.iter_mut().zip(&shares.yaw).for_each(|(twist, share)| *twist = yaw_scale * share * yaw);
         }
         for (thrust, twist) in thrust.iter_mut().zip(twist).take(count) {
@@ -148,28 +178,51 @@ impl MultirotorMixer {
     /// It goes on with slices: of an array of eight, compilers make eight copies of a loop that hardly ever runs.
     #[cold]
     #[inline(never)]
-    pub(super) fn compromise(&self, tilt: [f32; MAX_MOTORS], wanted: f32) -> (f32, f32) {
+    pub(super) fn compromise(&self, tilt: [f32; MAX_MOTORS], wanted: f32, limits: Limits) -> (f32, f32) {
         let (collectives, tilt) = (of(&self.shares.collective, self.count), of(&tilt, self.count));
         let mut tilt_scale = 1.0;
-        let (mut low, mut high) = self.collective_range(collectives, tilt, tilt_scale);
+        let (mut low, mut high) = limits.collective_range(collectives, tilt, tilt_scale);
         if low > high {
-            tilt_scale = self.tilt_scale(collectives, tilt);
-            (low, high) = self.collective_range(collectives, tilt, tilt_scale);
+            tilt_scale = limits.tilt_scale(collectives, tilt);
+            (low, high) = limits.collective_range(collectives, tilt, tilt_scale);
         }
         // Rounding may leave the range inside out by one bit.
         (wanted.min(high).max(low), tilt_scale)
     }
 
+    /// Largest share of `twist` (each rotor's part of yaw) for which every motor stays within its limits.
+    #[cold]
+    #[inline(never)]
+    fn yaw_scale(&self, thrust: [f32; MAX_MOTORS], twist: [f32; MAX_MOTORS], limits: Limits) -> f32 {
+        let mut scale = 1.0f32;
+        for (thrust, twist) in of(&thrust, self.count).iter().zip(twist) {
+            let room = if twist > 0.0 { limits.most - thrust } else { thrust - limits.least };
+            if scale * twist.abs() > room {
+                scale = room / twist.abs();
+            }
+        }
+        scale
+    }
+}
+
+/// What each motor can push with in this step, N.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub least: f32,
+    pub most: f32,
+}
+
+impl Limits {
     /// Largest share of `tilt` for which some collective thrust keeps every motor within its limits.
     #[inline(never)]
-    fn tilt_scale(&self, collectives: &[f32], tilt: &[f32]) -> f32 {
+    fn tilt_scale(self, collectives: &[f32], tilt: &[f32]) -> f32 {
         let mut scale = 1.0f32;
         let rotors = || collectives.iter().zip(tilt);
         // Collective u must satisfy min − s·p_i ≤ a_i·u and a_j·u ≤ max − s·p_j for all pairs.
         for (lower, p_lower) in rotors() {
             for (upper, p_upper) in rotors() {
                 let spread = p_upper * upper - p_lower * lower;
-                let room = self.thrust_max * upper - self.thrust_min * lower;
+                let room = self.most * upper - self.least * lower;
                 if scale * spread > room {
                     scale = room / spread;
                 }
@@ -180,31 +233,17 @@ impl MultirotorMixer {
 
     /// The collective thrusts for which every motor can deliver this share of roll and pitch.
     #[inline(never)]
-    fn collective_range(&self, collectives: &[f32], tilt: &[f32], tilt_scale: f32) -> (f32, f32) {
+    fn collective_range(self, collectives: &[f32], tilt: &[f32], tilt_scale: f32) -> (f32, f32) {
         // Roll and pitch add nothing to the sum of all thrusts.
-        let (mut low, mut high) = (self.thrust_min * tilt.len() as f32, f32::MAX);
+        let (mut low, mut high) = (self.least * tilt.len() as f32, f32::MAX);
         for (collective, part) in collectives.iter().zip(tilt) {
             let part = part * tilt_scale;
             // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
-            let (least, most) = ((self.thrust_min - part) * collective, (self.thrust_max - part) * collective);
+            let (least, most) = ((self.least - part) * collective, (self.most - part) * collective);
             low = if least > low { least } else { low };
             high = if most < high { most } else { high };
         }
         (low, high)
-    }
-
-    /// Largest share of `twist` (each rotor's part of yaw) for which every motor stays within its limits.
-    #[cold]
-    #[inline(never)]
-    fn yaw_scale(&self, thrust: [f32; MAX_MOTORS], twist: [f32; MAX_MOTORS]) -> f32 {
-        let mut scale = 1.0f32;
-        for (thrust, twist) in of(&thrust, self.count).iter().zip(twist) {
-            let room = if twist > 0.0 { self.thrust_max - thrust } else { thrust - self.thrust_min };
-            if scale * twist.abs() > room {
-                scale = room / twist.abs();
-            }
-        }
-        scale
     }
 }
 
@@ -217,7 +256,6 @@ fn of(values: &[f32; MAX_MOTORS], count: usize) -> &[f32] {
 impl Mixer for MultirotorMixer {
     #[inline]
     fn mix(&self, demand: &ControlOutput) -> Mixed {
-        // The usual number of motors as a constant: no loop is left of it.
-        if self.count == 4 { self.spread(4, demand) } else { self.spread(self.count, demand) }
+        self.mix_within(demand, self.thrust_max)
     }
 }

@@ -1,6 +1,7 @@
 //! What mixers of all kinds of airframes promise.
 
 use super::geometry::Shares;
+use super::multirotor::Limits;
 use super::*;
 use crate::airframe::{Airframe, Rotor, Spin};
 use proptest::prelude::*;
@@ -143,7 +144,10 @@ fn parts(mixer: &MultirotorMixer, demand: &ControlOutput) -> Vec<f32> {
 fn keeps_its_promises(rotors: &[Rotor], thrust_max: f32, shares: &ControlOutput) -> Result<(), TestCaseError> {
     let demand = &demand_on(rotors, thrust_max, shares);
     let mixer = MultirotorMixer::from_rotors(rotors, thrust_max).expect("flies");
+    // One whose battery gives no more is as one whose motors can do no more.
+    let stronger = MultirotorMixer::from_rotors(rotors, 1.7 * thrust_max).expect("flies");
     let mixed = mixer.mix(demand);
+    prop_assert_eq!(stronger.mix_within(demand, thrust_max), mixed);
     let got = produced(rotors, &mixed);
     let arm = rotors.iter().fold(0.0f32, |arm, r| arm.max(r.x.abs()).max(r.y.abs()));
     let fine = 1e-4 * thrust_max;
@@ -240,13 +244,13 @@ proptest! {
         let unmet = mixer.mix(&demand).unmet;
         let mut tilt = [0.0; MAX_MOTORS];
         tilt.iter_mut().zip(parts(&mixer, &demand)).for_each(|(part, asked)| *part = asked);
-        let found = mixer.compromise(tilt, demand.thrust);
+        let found = mixer.compromise(tilt, demand.thrust, Limits { least: max * low, most: max });
         prop_assert_eq!(found == (demand.thrust, 1.0), (unmet[0], unmet[3]) == (0.0, 0.0), "{:?} {:?}", found, unmet);
     }
 
     #[test]
-    fn any_bits_give_possible_thrusts(thrust: f32, x: f32, y: f32, z: f32) {
-        let mixed = MIXER.mix(&ControlOutput { thrust, torque: Vec3::new(x, y, z) });
+    fn any_bits_give_possible_thrusts(thrust: f32, x: f32, y: f32, z: f32, available: f32) {
+        let mixed = MIXER.mix_within(&ControlOutput { thrust, torque: Vec3::new(x, y, z) }, available);
         for thrust in mixed.thrust {
             prop_assert!((0.0..=QUADROTOR.motor_thrust_max).contains(&thrust));
         }

@@ -72,7 +72,8 @@ pub fn hq(job: &Job, shards: &[Shard], done: &dyn Fn(&[Shard])) -> Result<(), Fa
             let said = said.trim();
             let error = std::fs::read_to_string(error_file(job, *first)).unwrap_or_default();
             let why = [said, error.trim()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n");
-            let text = format!("HyperQueue ended ({status}) with {missing} of {all} shards missing, the first {first}\n{why}");
+            let text =
+                format!("HyperQueue ended ({status}) with {missing} of {all} shards missing, the first {first}\n{why}");
             Err(Unfinished(text).into())
         }
     }
