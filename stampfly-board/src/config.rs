@@ -79,17 +79,22 @@ impl Default for VehicleConfig {
     fn default() -> Self {
         let ground_clearance = GROUND_HEIGHT as f32;
         let weak = AIRFRAME.rotor_torque() * WEAK_SHARE;
+        let cascade = CascadeConfig::for_airframe(&AIRFRAME);
         Self {
             estimator: EstimatorKind::default(),
             controller: ControllerKind::default(),
             eskf: EskfConfig { ground_clearance, drag: (DRAG / MASS) as f32, ..EskfConfig::indoors() },
             complementary: ComplementaryConfig { ground_clearance, ..ComplementaryConfig::default() },
-            cascade: CascadeConfig::for_airframe(&AIRFRAME),
+            cascade,
             geometric: GeometricConfig::for_airframe(&AIRFRAME),
             indi: IndiConfig::for_airframe(&AIRFRAME),
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
-            mode: ModeConfig { flip_height: FlipConfig::for_airframe(&AIRFRAME).height_min, ..ModeConfig::default() },
+            mode: ModeConfig {
+                flip_height: FlipConfig::for_airframe(&AIRFRAME).height_min,
+                hover_throttle: cascade.altitude.hover_thrust / cascade.altitude.thrust_max,
+                ..ModeConfig::default()
+            },
             failsafe: FailsafeConfig {
                 weak_roll: weak.x,
                 weak_pitch: weak.y,

@@ -20,6 +20,9 @@ pub struct ModeConfig {
     pub throttle_rest: f32,
     /// Throttle above which an armed vehicle takes off in a manual mode, share of full throttle.
     pub throttle_take_off: f32,
+    /// Throttle with which the vehicle hovers in a manual mode, share of full throttle: the airframe's. A manual mode that is
+    /// chosen in the air begins when the stick has passed it.
+    pub hover_throttle: f32,
     /// Time between arming and take-off when the vehicle takes off by itself.
     pub spool: Duration,
     /// An armed vehicle that is not told to take off is disarmed after this long.
@@ -78,6 +81,8 @@ impl Default for ModeConfig {
             throttle_rest: 0.05,
             // Twice that, so that a stick that counts as at rest never takes off.
             throttle_take_off: 0.1,
+            // Multirotors are built to hover with about half of their thrust.
+            hover_throttle: 0.5,
             // Some time constants of a small motor, which are 20 ms each, with a margin for larger ones.
             spool: Duration::from_millis(300),
             // Time to look at the vehicle once more. One that was forgotten must not stay armed.

@@ -14,7 +14,7 @@
 //! | INIT, IDLE_HELD | kept for later | ignored | ignored |
 //! | IDLE_GROUND | applied | the switch is applied | POS_HOLD |
 //! | ARMED | applied | ignored | POS_HOLD |
-//! | FLYING | applied | ignored | ignored |
+//! | FLYING | applied; a manual mode after ALT_HOLD or POS_HOLD once the throttle stick has passed the hover, ALT_HOLD until then | ignored | ignored |
 //! | TAKEOFF, LANDING, FLIP | kept for later | ignored | ignored |
 //!
 //! A height-holding mode that loses the height stays what it is: the controller comes down without it, and after
@@ -123,7 +123,8 @@ fn choose_commander(state: &mut State, facts: &Facts) {
     }
     let pilot = &facts.pilot;
     let acts = pilot.deflected || pilot.mode_turned || pilot.switch.rises || pilot.switch.falls;
-    let retakes = facts.asked.flies() && !state.wanted.is_manual();
+    let manual = state.wanted.is_manual() || state.throttle_above.is_some();
+    let retakes = facts.asked.flies() && !manual;
     // On the ground no flight is interrupted.
     let starts = facts.asked.flies() && state.phase == FlightPhase::Armed;
     if acts {
@@ -136,7 +137,7 @@ fn choose_commander(state: &mut State, facts: &Facts) {
 fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let pilot = &facts.pilot;
     if pilot.mode_turned {
-        state.pending = pilot.mode;
+        (state.pending, state.throttle_above) = (pilot.mode, None);
     }
     let piloted = facts.sticks == CommandSource::Pilot;
     let wanted = match state.phase {
@@ -148,12 +149,18 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
         }
         FlightPhase::Armed | FlightPhase::Flying => {
             let on_ground = state.phase == FlightPhase::Armed;
-            // Until the pilot's throttle has arrived, a mode that makes thrust of it would make none.
-            let ready = |mode: &FlightMode| on_ground || piloted || !mode.is_manual();
-            let turned = state.pending.filter(|mode| state.commander == CommandSource::Pilot && ready(mode));
-            if turned.is_some() {
-                state.pending = None;
-            }
+            let turned = state.pending.filter(|_| state.commander == CommandSource::Pilot);
+            let turned = turned.and_then(|mode| {
+                if on_ground || !mode.is_manual() || state.wanted.is_manual() {
+                    (state.pending, state.throttle_above) = (None, None);
+                    Some(mode)
+                } else if piloted {
+                    Some(begin_manual(config, state, facts, mode))
+                } else {
+                    // Until the pilot's throttle has arrived, a mode that makes thrust of it would make none.
+                    None
+                }
+            });
             let guided = on_ground && facts.asked.flies() && state.commander == CommandSource::Guided;
             if guided { Some(FlightMode::PosHold) } else { turned }
         }
@@ -182,6 +189,19 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
     // No throttle is one at rest.
     state.throttle_rested |= pilot.frame.is_none() || facts.throttle_rests(config);
+}
+
+/// The mode in force when the pilot chooses a manual one in a mode that holds the height. There the throttle stick rests in its
+/// centre, or at any other place, and as thrust that would let the vehicle fall. So the height is held until the stick has
+/// passed the hover once, in whichever direction; tilt follows the sticks at once.
+fn begin_manual(config: &ModeConfig, state: &mut State, facts: &Facts, mode: FlightMode) -> FlightMode {
+    let throttle = facts.pilot.frame.as_ref().map_or(0.0, |(_, input)| input.throttle);
+    let above = throttle >= config.hover_throttle;
+    if *state.throttle_above.get_or_insert(above) == above {
+        return FlightMode::AltHold;
+    }
+    (state.pending, state.throttle_above) = (None, None);
+    mode
 }
 
 /// Pairing ends with the new transmitter's first frame, by the button, or after a time. The link refuses the old

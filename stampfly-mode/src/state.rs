@@ -50,6 +50,8 @@ pub struct State {
     pub mode: FlightMode,
     /// A mode that the pilot has switched to and that is not applied yet.
     pub pending: Option<FlightMode>,
+    /// A manual mode waits for the throttle stick to pass the hover: was the stick above it when the mode was chosen?
+    pub throttle_above: Option<bool>,
     /// Who has authority.
     pub commander: CommandSource,
     /// The vehicle takes off by itself after spool-up.
