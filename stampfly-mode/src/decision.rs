@@ -242,7 +242,10 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
                 asked.disarm || pilot.switch.falls || pilot.switch.found_off || waited(config.armed_timeout)
             }
             // A transmitter that restarts turns both switches at once; that is no wish to fall.
-            FlightPhase::TakeOff | FlightPhase::Flying => pilot.switch.falls && was_manual && state.mode.is_manual(),
+            FlightPhase::TakeOff | FlightPhase::Flying => {
+                let stays = facts.alerts.contains(Alerts::NO_LIFT) && state.is_low(config, facts);
+                (phase == FlightPhase::TakeOff && stays) || (pilot.switch.falls && was_manual && state.mode.is_manual())
+            }
             FlightPhase::Landing => {
                 let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
                 low || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)

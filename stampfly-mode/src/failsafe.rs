@@ -10,6 +10,7 @@
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
+//! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 20 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
@@ -47,6 +48,7 @@ mod config;
 mod force;
 mod imu;
 mod input;
+mod lift;
 mod motion;
 mod motors;
 mod power;
@@ -57,6 +59,7 @@ pub use input::FailsafeInput;
 use attitude::AttitudeMonitor;
 use force::ForceMonitor;
 use imu::ImuMonitor;
+use lift::LiftMonitor;
 use motion::{Contact, MotionMonitor};
 use motors::MotorMonitor;
 use power::PowerMonitor;
@@ -101,6 +104,7 @@ pub struct Failsafe {
     attitude: AttitudeMonitor,
     power: PowerMonitor,
     motors: MotorMonitor,
+    lift: LiftMonitor,
 }
 
 /// Alerts that stay until the vehicle is disarmed, and long enough to be seen.
@@ -112,6 +116,7 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::MOTOR_WEAK)
     .with(Alerts::MOTOR_LOST)
+    .with(Alerts::NO_LIFT)
     .with(Alerts::IMU_NOISY);
 
 impl Default for Failsafe {
@@ -141,6 +146,7 @@ impl Failsafe {
             attitude: AttitudeMonitor::new(&config),
             power: PowerMonitor::default(),
             motors: MotorMonitor::default(),
+            lift: LiftMonitor::default(),
         }
     }
 
@@ -161,6 +167,7 @@ impl Failsafe {
             .set(Alerts::TUMBLED, tumbled)
             .set(Alerts::MOTOR_WEAK, weak)
             .set(Alerts::MOTOR_LOST, lost)
+            .set(Alerts::NO_LIFT, self.lift.step(config, now, input))
             .set(Alerts::ESTIMATE_DIVERGED, input.status.diverged);
         if !found.is_empty() {
             self.latched_at = now;

@@ -70,7 +70,7 @@ impl Event {
                  `IMU_FAULTY`, `MOTOR_LOST`"
             }
             Self::Stop => {
-                "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. \
+                "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. TAKEOFF: `NO_LIFT`. \
                  LANDING: arm switch off or `Disarm` at the ground, a second deliberate switch-off of the pilot whose switch \
                  began the landing, or a landing that takes too long"
             }

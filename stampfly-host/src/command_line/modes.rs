@@ -4,6 +4,7 @@
 //! `decide`.
 
 use crate::command_line::failure::Failure;
+use stampfly_board::VehicleConfig;
 use stampfly_mode::arming::CHECKS;
 use stampfly_mode::decision::{State, decide};
 use stampfly_mode::transitions::{Event, TABLE, is_airborne};
@@ -17,6 +18,7 @@ pub fn run() -> Result<ExitCode, Failure> {
     transitions();
     guards();
     arbitration();
+    manual_modes();
     checks();
     Ok(ExitCode::SUCCESS)
 }
@@ -95,6 +97,35 @@ fn arbitration() {
             [(true, false), (false, false), (false, true)].map(|(turned, program)| becomes(phase, turned, program));
         outln!("| {phase:?} | {turned} | {differs} | {program} |");
     }
+}
+
+/// Why a manual mode waits for the throttle, with a picture of the stick.
+fn manual_modes() {
+    let percent = 100.0 * VehicleConfig::default().mode.hover_throttle;
+    outln!(
+        "\n## STABILIZE and ACRO in the air\n
+In ALT_HOLD and POS_HOLD the throttle stick asks for a climb rate, and its centre for none. In STABILIZE and
+ACRO the stick is thrust: none at the centre and below, all of it at the top. The vehicle hovers with the stick at
+{percent:.0} % of the way from the centre to the top. A stick with a spring rests in the centre, so a vehicle whose stick
+became thrust at once would fall.
+"
+    );
+    outln!(
+        "```text
+ throttle in ALT_HOLD, POS_HOLD      throttle in STABILIZE, ACRO
+
+ ┌───────┐ climbs                    ┌───────┐ full thrust
+ │   ┆   │                           │   ┆   │
+ │   ┆   │                           │···┆···│ {percent:.0} %: hovers; STABILIZE begins here
+ │   ●   │ holds its height          │   ●   │ no thrust
+ │   ┆   │                           │   ┆   │
+ └───────┘ sinks                     └───────┘ no thrust
+```
+
+Turned to STABILIZE or ACRO, the vehicle is in ALT_HOLD until the throttle stick has passed the hover once, upwards or
+downwards. Tilt follows the sticks at once. A switch that was turned during take-off counts when the vehicle flies, by the
+same rule. From STABILIZE to ACRO and back there is nothing to wait for."
+    );
 }
 
 fn checks() {

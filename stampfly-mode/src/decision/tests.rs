@@ -44,11 +44,12 @@ const HAPPENINGS: &[Happening] = &[
     ("take-off complete", |f| f.takeoff_complete = true),
     ("sticks lost", |f| f.sticks = CommandSource::Failsafe),
     ("height lost", |f| f.valid = Validity::TILT),
+    ("near the ground", |f| f.height = 0.05),
 ];
 
 /// Alerts that differ in what they do. Every other one does the same as the first of its line: [`merged`], shown by
 /// `alerts_of_a_kind_are_one`.
-const KINDS: [&[Alerts]; 13] = [
+const KINDS: [&[Alerts]; 14] = [
     &[Alerts::COMM_LOST],
     // Motors off, and no arming.
     &[Alerts::IMPACT, Alerts::GYRO_ANOMALY, Alerts::TUMBLED, Alerts::IMU_LOST, Alerts::IMU_FAULTY, Alerts::MOTOR_LOST],
@@ -58,6 +59,8 @@ const KINDS: [&[Alerts]; 13] = [
     &[Alerts::ESTIMATE_DIVERGED],
     // Landing at once.
     &[Alerts::MOTOR_WEAK],
+    // A take-off is over.
+    &[Alerts::NO_LIFT],
     // A take-off is broken off, and no flip.
     &[Alerts::RANGE_IMPLAUSIBLE],
     // No flip, and no arming: always, and in a mode that holds height.
@@ -243,13 +246,14 @@ fn alerts_of_a_kind_are_one() {
     // Larger ones: a stride that is odd comes to all of the 2^n sets in the end, and visits them evenly until then.
     sets.extend((0..3_000u32).map(|k| k.wrapping_mul(0x9e37_79b1) & Alerts::ALL.bits()));
     // What an alert refuses or changes.
-    let relevant: [&[&str]; 6] = [
+    let relevant: [&[&str]; 7] = [
         &["Arm"],
         &["switch on", "mode switch to STABILIZE"],
         &["switch on", "mode switch to ALT_HOLD"],
         &["Flip"],
         &["TakeOff"],
         &["height lost"],
+        &["near the ground"],
     ];
     let happens = |names: &[&str], facts: &mut Facts| {
         for name in names {
@@ -307,8 +311,11 @@ fn check(state: &State, facts: &Facts, next_state: &State, why: &dyn Fn() -> std
         if stopped {
             let manual = state.mode.is_manual() && facts.pilot.switch.falls;
             let second = state.phase == FlightPhase::Landing && state.landing_by_switch && facts.pilot.switch.falls;
-            assert!(manual || second, "motors stopped in the air: {}", why());
-            assert!(!next_state.unacknowledged.is_empty(), "not to be acknowledged: {}", why());
+            let low = facts.known_height().is_some_and(|height| height < ModeConfig::default().stop_height);
+            let stays = state.phase == FlightPhase::TakeOff && facts.alerts.contains(Alerts::NO_LIFT);
+            let lands = state.phase == FlightPhase::Landing && (facts.asked.disarm || facts.pilot.switch.falls);
+            assert!(manual || second || low && (stays || lands), "motors stopped in the air: {}", why());
+            assert!(low || !next_state.unacknowledged.is_empty(), "not to be acknowledged: {}", why());
         }
         let turned = facts.pilot.mode_turned || state.pending.is_some();
         if next_state.mode.is_manual() && !state.mode.is_manual() {

@@ -3,6 +3,7 @@
 mod battery;
 mod force;
 mod inertial;
+mod lift;
 mod motors;
 mod tipping;
 

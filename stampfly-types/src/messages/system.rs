@@ -213,6 +213,8 @@ message_flags! {
         MOTOR_LOST = 23,
         /// A motor turns although the vehicle is disarmed.
         MOTOR_RUNS = 24,
+        /// The thrust that is asked for does not lift the vehicle off the ground: motors off.
+        NO_LIFT = 25,
     }
 }
 

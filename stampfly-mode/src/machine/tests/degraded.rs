@@ -145,3 +145,13 @@ fn another_vehicle_waits_as_long_as_its_configuration_says() {
     let landed_after = (0..2_000).find(|_| world.step(&mut machine, &[]).flight_status.phase == FlightPhase::Landing);
     assert_eq!(landed_after, Some(400), "1 s at 400 Hz");
 }
+
+#[test]
+fn a_take_off_that_lifts_nothing_stops_the_motors_and_a_flight_does_not() {
+    for (phase, next) in [(FlightPhase::TakeOff, FlightPhase::IdleGround), (FlightPhase::Flying, FlightPhase::Flying)] {
+        let (mut machine, mut world) = in_phase(phase);
+        (world.alerts, world.estimate.height, world.land_detected.contact) =
+            (Alerts::NO_LIFT, 0.05, GroundContact::Ground);
+        assert_eq!(world.step(&mut machine, &[Command::None]).flight_status.phase, next, "{phase:?}");
+    }
+}
