@@ -1,4 +1,4 @@
-//! `stampfly campaign`: many flights. Exit code 1 when one of them did not land disarmed, or when the estimator's
+//! `stampfly campaign`: many flights. Exit code 1 when one of them did not end as it should, or when the estimator's
 //! consistency was asked for and is outside its bars.
 
 use crate::campaign::parallel::workers;
@@ -16,6 +16,9 @@ use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
+
+/// Of so many flights that did not succeed it is printed why.
+const MOST_TOLD: usize = 20;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
     if options.consistency {
@@ -124,8 +127,12 @@ fn print<V: Vehicle, W>(
     let cores = workers(all, None);
     let plural = if cores == 1 { "" } else { "s" };
     outln!("\n{succeeded} of {all} flights succeeded; {factor:.0} × real time on {cores} core{plural}");
-    if !failed.is_empty() {
-        outln!("seeds that did not: {failed:?}");
+    let failures = || flights.iter().filter(|flight| !flight.succeeded());
+    for flight in failures().take(MOST_TOLD) {
+        outln!("  seed {:<12} {}", flight.seed, flight.flown.outcome.sentence());
+    }
+    if failed.len() > MOST_TOLD {
+        outln!("  and {} more; --json has all of them", failed.len() - MOST_TOLD);
     }
     if let Some(summary) = consistency {
         print_consistency(summary);

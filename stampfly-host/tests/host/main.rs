@@ -56,3 +56,4 @@ mod stopped;
 mod swap;
 mod thorough;
 mod tunes;
+mod verdicts;
