@@ -40,7 +40,9 @@ fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
                     climb(&mut hands, 2.0).await;
                     // About the throttle that carries it, and a little lean.
                     let flown = PilotInput { mode, arm: true, throttle: 0.55, pitch: 0.1, ..STICKS };
-                    send(&mut hands, 0.2, flown).await;
+                    // The mode begins when the stick has passed it.
+                    send(&mut hands, 0.15, PilotInput { throttle: 0.65, ..flown }).await;
+                    send(&mut hands, 0.1, flown).await;
                     note.set(hands.frame(&flown));
                 })
             });
@@ -53,6 +55,109 @@ fn d4_a_pilot_lost_in_stabilize_or_acro_is_levelled_and_landed() {
             let speed = touches(&what, &seen, since);
             assert!(speed < 0.6, "{what}: {speed} m/s");
         }
+    }
+}
+
+/// Height that is lost between these instants, m.
+fn lost_height(seen: &Seen, since: Instant, until: Instant) -> f32 {
+    let meanwhile = seen.truths.iter().filter(|(at, _)| (since..=until).contains(at));
+    let heights = meanwhile.map(|(_, truth)| -truth.position.z);
+    let (mut first, mut lowest) = (None, f32::INFINITY);
+    for height in heights {
+        first.get_or_insert(height);
+        lowest = lowest.min(height);
+    }
+    first.expect("it flew on") - lowest
+}
+
+/// A throttle with a spring rests in its centre. In STABILIZE and ACRO that is no thrust.
+#[test]
+fn a_switch_to_a_manual_mode_with_the_stick_in_its_centre_costs_no_height() {
+    for seed in 1..=thorough(2, 40) {
+        for (from, to) in [
+            (FlightMode::PosHold, FlightMode::Stabilize),
+            (FlightMode::AltHold, FlightMode::Acro),
+            (FlightMode::AltHold, FlightMode::Stabilize),
+            (FlightMode::PosHold, FlightMode::Acro),
+        ] {
+            // At 0.5 m/s: 0.5 m of the take-off, to 2.9 m.
+            let climbs = (seed % 7) as f32 * 0.8;
+            let chatters = seed % 2 == 0;
+            let (since, note) = instant();
+            let seen = run(seed, 40.0, |mut hands| {
+                Box::pin(async move {
+                    climb(&mut hands, climbs).await;
+                    let flown = PilotInput { mode: from, arm: true, ..STICKS };
+                    send(&mut hands, 1.0, flown).await;
+                    note.set(hands.clock.now());
+                    for _ in 0..if chatters { 10 } else { 0 } {
+                        send(&mut hands, 0.1, PilotInput { mode: to, ..flown }).await;
+                        send(&mut hands, 0.1, flown).await;
+                    }
+                    send(&mut hands, 3.0, PilotInput { mode: to, ..flown }).await;
+                    hands.leave();
+                })
+            });
+            let until = since.get() + Duration::from_seconds(if chatters { 4.9 } else { 2.9 });
+            let lost = lost_height(&seen, since.get(), until);
+            assert!(lost <= 0.3, "{from:?} to {to:?}, seed {seed}: {lost} m");
+            let (phase, mode, _) = at(&seen, until);
+            assert_eq!((phase, mode), (FlightPhase::Flying, FlightMode::AltHold), "{from:?} to {to:?}, seed {seed}");
+        }
+    }
+}
+
+/// The switch is turned during the take-off, and stays there.
+#[test]
+fn a_manual_mode_that_is_chosen_on_the_way_up_does_not_drop_the_vehicle() {
+    for seed in 1..=thorough(2, 40) {
+        for mode in [FlightMode::Stabilize, FlightMode::Acro] {
+            let (since, note) = instant();
+            let seen = run(seed, 20.0, |mut hands| {
+                Box::pin(async move {
+                    let flown = PilotInput { arm: true, ..STICKS };
+                    while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
+                        send(&mut hands, 0.1, STICKS).await;
+                    }
+                    while hands.telemetry().phase != FlightPhase::TakeOff {
+                        send(&mut hands, 0.02, flown).await;
+                    }
+                    while hands.telemetry().phase == FlightPhase::TakeOff {
+                        send(&mut hands, 0.02, PilotInput { mode, ..flown }).await;
+                    }
+                    note.set(hands.clock.now());
+                    send(&mut hands, 3.0, PilotInput { mode, ..flown }).await;
+                    hands.leave();
+                })
+            });
+            let until = since.get() + Duration::from_seconds(2.9);
+            let lost = lost_height(&seen, since.get(), until);
+            assert!(lost <= 0.3, "{mode:?}, seed {seed}: {lost} m");
+            assert_eq!(at(&seen, until).1, FlightMode::AltHold, "{mode:?}");
+        }
+    }
+}
+
+/// Once the stick has passed the hover the vehicle is the pilot's.
+#[test]
+fn the_pilot_has_the_throttle_when_the_stick_has_passed_the_hover() {
+    for seed in 1..=thorough(1, 10) {
+        let (since, note) = instant();
+        let seen = run(seed, 20.0, |mut hands| {
+            Box::pin(async move {
+                climb(&mut hands, 1.0).await;
+                let flown = PilotInput { mode: FlightMode::Stabilize, arm: true, ..STICKS };
+                send(&mut hands, 0.5, flown).await;
+                send(&mut hands, 0.2, PilotInput { throttle: 0.8, ..flown }).await;
+                note.set(hands.clock.now());
+                send(&mut hands, 0.8, PilotInput { throttle: 0.8, ..flown }).await;
+                hands.leave();
+            })
+        });
+        assert_eq!(at(&seen, since.get()).1, FlightMode::Stabilize, "seed {seed}");
+        let climbs = seen.truths.iter().filter(|(at, _)| *at >= since.get()).map(|(_, truth)| -truth.velocity.z);
+        let fastest = climbs.fold(0.0f32, f32::max);
+        assert!(fastest > 1.0, "seed {seed}: a third more thrust than its weight climbs at {fastest} m/s");
     }
 }
 
