@@ -131,4 +131,16 @@ mod tests {
         let steps = crate::STEPS.iter().filter(|step| step.lane != Lane::Manual).map(|step| step.name);
         assert_eq!(steps.filter(|name| !has(name)).collect::<Vec<_>>(), Vec::<&str>::new());
     }
+
+    /// Code changes, and what a control replaces is there no more.
+    #[test]
+    fn every_control_finds_what_it_breaks() {
+        let repository = Repository::find();
+        for control in List::read(&repository).expect("a list").controls {
+            for change in &control.changes {
+                let text = std::fs::read_to_string(repository.root.join(&change.file)).expect("the file is there");
+                assert!(change.broken(&text).is_ok(), "{}: {}: {:?}", control.step, change.file, change.broken(&text));
+            }
+        }
+    }
 }
