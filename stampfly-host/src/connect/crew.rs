@@ -203,8 +203,8 @@ mod tests {
         }
         let now = Instant::from_secs(5);
         assert_eq!(crew.ask(now, 1, &Ask::Guided(Guided::Arm {})), Ok(Some(Ask::Guided(Guided::Arm {}))));
-        // The vehicle's state comes later than what was asked.
-        assert_eq!(crew.ask(now, 2, &idle), Ok(None), "another has asked");
+        // The vehicle's state comes later than what was asked: nothing is held yet.
+        assert_eq!(crew.ask(now, 2, &idle), Ok(Some(idle.clone())), "it stands");
         crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
         assert_eq!(crew.ask(now, 2, &idle), Ok(Some(idle.clone())), "it rests");
         let rise = Ask::Guided(Guided::TakeOff { height: 0.5 });
