@@ -40,7 +40,7 @@ struct Refused {
     why: Refusal,
 }
 
-/// What the station is told of what others ask.
+/// The newest request of another client, for the station.
 #[derive(Clone, Copy, Debug, Default)]
 struct Notice {
     /// The number of the newest one in the helm that was taken, and what it is.
@@ -292,7 +292,7 @@ impl<'b> Link<'b> {
 /// A text for people, as far as there is room for it.
 fn text(what: &dyn Display) -> String<TEXT> {
     let mut text = String::new();
-    // What is too long is cut.
+    // The rest of a text that is too long is left out.
     _ = write!(text, "{what}");
     text
 }

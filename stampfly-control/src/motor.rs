@@ -156,7 +156,7 @@ impl MotorStage {
         self.voltage.unwrap_or(self.config.nominal_voltage)
     }
 
-    /// What a motor can push with at its largest duty and the voltage in use, N: the limit for
+    /// Thrust of a motor at its largest duty and the voltage in use, N: the limit for
     /// [`MultirotorMixer::mix_within`](crate::MultirotorMixer::mix_within) in the next step.
     #[inline]
     #[must_use]

@@ -17,7 +17,8 @@ const PERIOD: Duration = Duration::from_millis(5);
 #[cfg(all(feature = "record", feature = "wifi"))]
 compile_error!("the features `record` and `wifi` do not fit into the StampFly's memory together");
 
-/// Of the black box. Beside the flight record there is room for three seconds of a flight, beside the network for two and a half.
+/// Size of the black box. Next to the flight record there is room for three seconds of a flight, next to the network for two and
+/// a half.
 const WORDS: usize = if cfg!(feature = "wifi") {
     5 * 1024
 } else if cfg!(feature = "record") {

@@ -205,7 +205,7 @@ impl MultirotorMixer {
     }
 }
 
-/// What each motor can push with in this step, N.
+/// Least and largest thrust of each motor in this step, N.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub least: f32,

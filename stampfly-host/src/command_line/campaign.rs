@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Of so many flights that did not succeed it is printed why.
+/// Largest number of failed flights whose reason is printed.
 const MOST_TOLD: usize = 20;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {

@@ -45,7 +45,7 @@ impl Crowd {
             assert!(done, "{name}: {what} is not done");
         }
         live(&mut *flies, &mut watches, 5.0);
-        // Meanwhile nobody else commands, and is told so.
+        // Meanwhile the commands of others are refused.
         for one in &mut watches {
             flies.lives(Duration::from_millis(400));
             one.asks("hold", Duration::ZERO);

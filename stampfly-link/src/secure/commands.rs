@@ -132,7 +132,7 @@ impl Commands {
     }
 
     /// Takes a [refusal](Payload::Refusal). Was it the command that is being said? It is not said again: the vehicle would refuse
-    /// it again, or do it when nobody expects it any more. A kill is never refused, and goes on.
+    /// it again, or do it when the sender no longer expects it. A kill is never refused, and goes on.
     pub fn refuse(&mut self, number: u32) -> bool {
         let is_it = |said: &Said| said.number == number && !said.is_kill();
         let is_first = self.waiting.first().is_some_and(|first| first.as_ref().is_some_and(is_it));

@@ -3,7 +3,8 @@
 //! It takes off, its controller asks for more thrust than carries the weight, and neither height nor specific force follows:
 //! it is too heavy, its battery too weak, or something holds it. Motors at their limit take it over the floor, and heat up.
 //!
-//! Height alone is no witness: a range that hangs says the same of a vehicle that climbs. So the force has to be missing too.
+//! The height alone does not show it: a range finder that hangs measures the same while the vehicle climbs. So the specific
+//! force has to be missing as well.
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
@@ -11,12 +12,13 @@ use crate::lasting::lasts;
 use stampfly_types::messages::{FlightPhase, Validity};
 use stampfly_types::{Duration, GRAVITY, Instant};
 
-/// Thrust above that of the weight, and above what the specific force shows, in shares of the weight: three times what vibration
-/// moves an accelerometer's zero by.
+/// Thrust above that of the weight, and above the specific force, in shares of the weight: the hover thrust is known to a few
+/// per cent.
 const MISSING: f32 = 0.1;
 /// Weight of a step in the mean force: 50 ms at 400 Hz, as motors follow.
 const WEIGHT: f32 = 0.05;
-/// The ceiling of a take-off's thrust rises by 0.4 of the weight meanwhile, and lets a battery of half its strength lift.
+/// Meanwhile the ceiling of a take-off's thrust rises from 1.2 of the weight to 1.6, so that motors which give 0.65 of the
+/// demand lift the vehicle.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// What is remembered of a take-off.
@@ -29,7 +31,7 @@ pub(super) struct LiftMonitor {
 }
 
 impl LiftMonitor {
-    /// Has thrust been asked for, and lifted nothing, for long?
+    /// Has the controller asked for more thrust than the weight for [`PATIENCE`], without height and force?
     pub(super) fn step(&mut self, config: &FailsafeConfig, now: Instant, input: &FailsafeInput<'_>) -> bool {
         let estimate = input.estimate;
         self.force += (-estimate.specific_force.z - self.force) * WEIGHT;

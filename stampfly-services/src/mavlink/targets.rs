@@ -162,7 +162,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         let yaw = (!mask.contains(NO_YAW)).then_some(target.yaw);
         let yaw_rate = if yaw.is_none() { part(NO_YAW_RATE, target.yaw_rate) } else { 0.0 };
         let numbers = [velocity.norm(), yaw_rate, yaw.unwrap_or_default(), down.unwrap_or_default()];
-        // What is no number is within no limit.
+        // A comparison with NaN is false, so NaN is refused.
         let is_sane = numbers.iter().all(|number| number.abs() <= FASTEST) && acceleration.norm() <= HARDEST;
         if !is_sane {
             return self.client.complain(Unserved::Target, &Refusal::Range, self.put);
