@@ -30,20 +30,6 @@ const READS: [u32; 6] = [
     TIMESYNC_DATA::ID,
 ];
 
-/// Lands the vehicle, or stops its motors: right at any time.
-pub(super) fn ends_a_flight(frame: &MavMessage) -> bool {
-    let (command, first) = match frame {
-        MavMessage::COMMAND_LONG(data) => (data.command, data.param1),
-        MavMessage::COMMAND_INT(data) => (data.command, data.param1),
-        _ => return false,
-    };
-    match command {
-        MavCmd::MAV_CMD_NAV_LAND | MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => true,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => first == 0.0,
-        _ => false,
-    }
-}
-
 /// Who commands.
 #[derive(Debug, Default)]
 pub(super) struct Crew {

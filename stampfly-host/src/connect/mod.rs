@@ -31,7 +31,7 @@ pub use sealed::{RadioPlace, RadioPlaceError};
 
 use crate::ground;
 use crate::serve::OpenPorts;
-use crew::{Crew, ends_a_flight};
+use crew::Crew;
 use log::Log;
 use record::Record;
 use stampfly_bus::{Schedule, TopicInfo, TopicTable};
@@ -42,7 +42,7 @@ use stampfly_link::mavlink::dialects::common::{
 };
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersion, MavlinkWriter, MessageData as _};
 use stampfly_link::secure::Key;
-use stampfly_services::mavlink::Pulse;
+use stampfly_services::mavlink::{Pulse, ends_a_flight};
 use stampfly_services::{Asked as Done, Seat, Told};
 use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
 use stampfly_types::Message as _;
@@ -260,7 +260,7 @@ impl<V: Vehicle> Ends<V> {
                     pulse.hear(now, frame.id == HEARTBEAT_DATA::ID);
                     let numbers = [frame.system, frame.component];
                     let order = Crew::is_order(frame.id).then(|| frame.message().ok()).flatten();
-                    let ends = order.as_ref().is_some_and(ends_a_flight);
+                    let ends = ends_a_flight(&frame);
                     let may = crew.may(now, client, numbers, frame.id) || ends;
                     let is_marked = Crew::is_order(frame.id) && !ends;
                     // An order without a time would be done whenever a line that is held up lets it through.

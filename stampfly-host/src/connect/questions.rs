@@ -3,7 +3,7 @@
 //! A question for a parameter is asked again as it was: to write a value twice is to write it once. A line has a number, so that the vehicle does once what it says, and is asked for
 //! the part of its answer that is missing. Commands are [`Commands`](stampfly_link::secure::Commands)'. No socket, no clock, no key.
 
-use stampfly_link::secure::Payload;
+use stampfly_link::secure::{FRESH, Payload};
 use stampfly_types::{Duration, Instant};
 use std::collections::VecDeque;
 
@@ -15,9 +15,7 @@ const AGAIN: Duration = Duration::from_millis(300);
 const GAP: Duration = Duration::from_millis(60);
 /// For this long. A station that gives up after three seconds has given up on none that may still be answered.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// What changes something is not asked any more when it is older.
-const FRESH: Duration = Duration::from_secs(1);
-/// And is asked again after this long.
+/// A question that changes something is asked again after this long, as long as it is [`FRESH`].
 const CHANGE_AGAIN: Duration = Duration::from_millis(150);
 
 /// Seals a payload and sends it. Returns the counter of its frame; `None` when it could not be sealed.

@@ -13,7 +13,7 @@ use stampfly_types::{Duration, Instant};
 const WAITING: usize = 4;
 /// A command that is older is not said any more: who asked for it has seen by then that nothing
 /// happened.
-const FRESH: Duration = Duration::from_secs(1);
+pub const FRESH: Duration = Duration::from_secs(1);
 /// A kill and a landing are right at any time, and are said for longer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two frames of a command. An acknowledgement takes a turn of the vehicle's, 20 ms, and twice the way.

@@ -107,7 +107,7 @@ mod vehicle;
 
 pub use budget::Budget;
 pub use clock::MAX_AGE;
-pub use commands::Commands;
+pub use commands::{Commands, FRESH};
 pub use frame::{Kind, MAX_BODY, MAX_FRAME, MIN_FRAME, key_id, put};
 pub use guarded::{Guarded, Heard, NotTaken, Policy};
 pub use key::{Key, KeyError, Phrase, Uri};

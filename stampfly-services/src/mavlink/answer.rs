@@ -7,6 +7,7 @@ use super::orders::say;
 use super::unreadable::Unreadable;
 use super::unserved::Unserved;
 use super::{parameters, streams, targets};
+use stampfly_link::mavlink::MavlinkFrame;
 use stampfly_link::mavlink::dialects::common::{LOG_ENTRY_DATA, MavMissionType, MavResult, PING_DATA, TIMESYNC_DATA};
 use stampfly_types::Origin;
 use stampfly_types::messages::{FlightMode, PilotInput};
@@ -97,7 +98,17 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
     None
 }
 
-/// Does it move the vehicle, or change how it flies? What ends a flight is done whatever its age.
+/// Does a frame land the vehicle or stop its motors? That is done whatever its age, at the request of any client.
+#[must_use]
+pub fn ends_a_flight(frame: &MavlinkFrame<'_>) -> bool {
+    match Heard::read(frame) {
+        Some(Ok(Heard::CommandLong(command))) => commands::Command::from(&command).ends_a_flight(),
+        Some(Ok(Heard::CommandInt(command))) => commands::Command::from(&command).ends_a_flight(),
+        _ => false,
+    }
+}
+
+/// Does it move the vehicle, or change how it flies? A command that ends a flight is done whatever its age.
 fn is_an_order(message: &Heard) -> bool {
     match message {
         Heard::CommandLong(command) => !commands::Command::from(command).ends_a_flight(),

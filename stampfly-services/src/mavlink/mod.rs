@@ -55,6 +55,7 @@ mod unserved;
 
 use crate::cockpit::Cockpit;
 use crate::refusal::Seat;
+pub use answer::ends_a_flight;
 use calibration::Calibrating;
 use client::{Client, Fed, Guard, Put};
 use commands::Turn;
