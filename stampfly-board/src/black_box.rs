@@ -9,8 +9,8 @@ use stampfly_flight::black_box::{LogRate, Retention};
 use stampfly_flight::newest::message;
 use stampfly_types::messages::FlightStatus;
 
-/// Memory that the firmware has for it, words: 39 kB.
-pub const WORDS: usize = 10 * 1024 - 512;
+/// Memory that the firmware has for it, words: 36 KiB.
+pub const WORDS: usize = 9 * 1024;
 
 /// A black box for this vehicle.
 pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;

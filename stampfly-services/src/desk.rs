@@ -118,47 +118,6 @@ impl Post {
     }
 }
 
-/// What [`Post`] was before questions had numbers.
-#[deprecated(since = "0.2.1", note = "use `Post`, which has parts of answers, too")]
-#[derive(Clone, Debug, PartialEq)]
-pub enum Letter {
-    /// A parameter.
-    Parameter {
-        /// Its place.
-        index: u16,
-        /// Its value.
-        value: f32,
-        /// Was it changed as it was asked for?
-        taken: bool,
-    },
-    /// A reply's part, and whether it is the last.
-    Reply(String<PIECE>, bool),
-}
-
-#[allow(deprecated, reason = "of the deprecated type itself")]
-impl Letter {
-    /// A copy of what a desk has answered. `None` of anything else.
-    #[must_use]
-    pub fn of(payload: &Payload<'_>) -> Option<Self> {
-        match Post::of(payload)?.0 {
-            Copied::Parameter { index, value, taken } => Some(Self::Parameter { index, value, taken }),
-            Copied::Reply { text, last } => Some(Self::Reply(text, last)),
-            Copied::Part { .. } => None,
-        }
-    }
-
-    /// What is to be sent.
-    #[must_use]
-    pub fn payload(&self) -> Payload<'_> {
-        match self {
-            Self::Parameter { index, value, taken } => {
-                Payload::Parameter { index: *index, value: *value, taken: *taken }
-            }
-            Self::Reply(text, last) => Payload::Reply { text, last: *last },
-        }
-    }
-}
-
 /// Questions of one station.
 ///
 /// Give it what is asked with [`ask`](Self::ask), and send what [`answer`](Self::answer) returns as long as there is room for more. `stampfly-board`'s tests have
