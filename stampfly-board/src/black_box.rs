@@ -2,7 +2,7 @@
 //!
 //! Motion, motors and their demands at twenty samples a second and more, because an accident is over in a tenth of one;
 //! decisions when they change; what can be computed from other topics, or ended before the flight, not at all. That is
-//! more than five seconds in [`WORDS`]. Not for the analysis of a whole flight: the log of a host keeps every sample.
+//! more than four and a half seconds in [`WORDS`]. Not for the analysis of a whole flight: the log of a host keeps every sample.
 
 use crate::topics::{COUNT, Id, TOPICS};
 use stampfly_flight::black_box::{LogRate, Retention};

@@ -108,9 +108,11 @@ fn run(folder: &Path, words: &[&str]) -> (Output, Duration, Option<u64>) {
     (output, begun.elapsed(), peak)
 }
 
-/// The most memory that it has had so far, MB.
+/// The most memory that it has had so far, MB. `None` before the program runs: until then the child
+/// is a copy of the test, with its memory.
 fn resident(child: &Child) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+    status.lines().find(|line| line.starts_with("Name:") && line.ends_with("stampfly"))?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.split_whitespace().next()?.parse::<u64>().ok()?.div_ceil(1_000))
 }

@@ -129,10 +129,10 @@ fn for_a_minute_in_altitude_hold_with_any_stick() {
 
 #[test]
 fn for_a_minute_in_stabilize_with_any_stick() {
-    held_for_a_minute(FlightMode::Stabilize, 1..=2, 22);
+    held_for_a_minute(FlightMode::Stabilize, 1..=2, 19);
 }
 
 #[test]
 fn for_a_minute_in_acro_with_any_stick() {
-    held_for_a_minute(FlightMode::Acro, 1..=2, 22);
+    held_for_a_minute(FlightMode::Acro, 1..=2, 19);
 }
