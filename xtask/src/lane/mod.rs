@@ -97,7 +97,7 @@ fn job(repository: &Repository, lane: Lane, work: &Mutex<Work>, ended: &Condvar,
             Err(log) => eprintln!("FAILED  {:<14} {seconds:>7.1} s\n{log}", step.name),
         }
         let outcome = if outcome.is_ok() { Outcome::Passed } else { Outcome::Failed };
-        if let (Outcome::Passed, Err(failure)) = (outcome, passed.remember(step.name, seconds)) {
+        if let Err(failure) = passed.remember(step.name, seconds, outcome) {
             eprintln!("{failure}");
         }
         guard.rows.push(Row { name: step.name, outcome, seconds });

@@ -3,6 +3,7 @@
 //! A line a step in `target/xtask/LANE.passed`: commit, seconds since 1970, seconds that it took, name. A working copy with
 //! changes is at no commit: its steps are neither kept nor left out.
 
+use super::table::Outcome;
 use crate::repository::{Failure, Repository, capture};
 use crate::step::Lane;
 use std::fs::{self, OpenOptions};
@@ -41,9 +42,9 @@ impl Passed {
         self.steps.iter().find(|(name, _)| name == step).map(|(_, seconds)| *seconds)
     }
 
-    /// A step has passed now.
-    pub fn remember(&self, step: &str, seconds: f64) -> Result<(), Failure> {
-        let Some(commit) = &self.commit else { return Ok(()) };
+    /// A step has ended now: writes it down if it has passed.
+    pub fn remember(&self, step: &str, seconds: f64, outcome: Outcome) -> Result<(), Failure> {
+        let Some(commit) = self.commit.as_ref().filter(|_| outcome == Outcome::Passed) else { return Ok(()) };
         let line = format!("{commit} {} {seconds:.1} {step}\n", now());
         let file = OpenOptions::new().create(true).append(true).open(&self.path);
         file.and_then(|mut file| file.write_all(line.as_bytes())).map_err(|e| format!("{}: {e}", self.path.display()))
@@ -67,7 +68,20 @@ fn read(text: &str, commit: &str, now: u64) -> Vec<(String, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::read;
+    use super::{Outcome, Passed, now, read};
+
+    #[test]
+    fn a_step_that_failed_is_run_again() {
+        let path = std::env::temp_dir().join(format!("passed-{}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        let passed = Passed { path: path.clone(), commit: Some("aa".to_owned()), steps: Vec::new() };
+        for (step, outcome) in [("fmt", Outcome::Passed), ("doc", Outcome::Failed), ("late", Outcome::PassedEarlier)] {
+            passed.remember(step, 1.0, outcome).expect("a file");
+        }
+        let text = std::fs::read_to_string(&path).expect("a file");
+        std::fs::remove_file(&path).expect("removed");
+        assert_eq!(read(&text, "aa", now()), [("fmt".to_owned(), 1.0)]);
+    }
 
     #[test]
     fn only_this_commits_steps_of_the_last_day_count() {
