@@ -2,16 +2,18 @@
 //!
 //! One thread does both. Writing gives up after a few milliseconds when the client does not take
 //! what is sent; then state is left out and counted until it does, and asks are still heard.
-//! Answers and events are not left out: a client that takes nothing for too long is cut off.
+//! Answers and events are not left out: a client that takes nothing for too long is cut off. A
+//! client that breaks the protocol is told so with a close code.
 
 use super::limits::Limits;
 use super::pulse::Pulse;
+use super::wire::Wire;
 use crate::waited::{has_only_waited, wait_at_most};
 use stampfly_ground::Feed;
 use stampfly_ground::ask::{Ask, AskError, Asked, Incoming, Reply};
 use stampfly_ground::{Connection, Hub};
-use std::io::{self, ErrorKind};
-use std::net::TcpStream;
+use std::io::{self, ErrorKind, Read};
+use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tungstenite::protocol::frame::coding::CloseCode;
@@ -26,11 +28,13 @@ const WRITE: Duration = Duration::from_millis(5);
 const RATE: u8 = 50;
 /// What may wait to be written, bytes.
 const WAITING: usize = 4 << 20;
+/// Longest wait for a client to take a close frame, and to end the connection behind it.
+const PART: Duration = Duration::from_secs(1);
 
 struct Page {
     hub: Arc<Hub>,
     connection: Connection,
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<Wire>,
     feed: Feed,
     period: Duration,
     pulse: Pulse,
@@ -47,21 +51,27 @@ pub(super) fn serve(hub: Arc<Hub>, stream: TcpStream, rest: Vec<u8>, limits: &Li
     if stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(WRITE))).is_err() {
         return;
     }
-    let socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+    let socket = WebSocket::from_raw_socket(Wire::new(stream, rest), Role::Server, Some(config));
     let session = session();
     let connection = if session.is_empty() { hub.connect() } else { hub.connect_as(&session) };
     let feed = Feed::new(hub.clone());
     let mut page = Page { hub, connection, socket, feed, period: period(RATE), pulse: Pulse::new(super::now()) };
-    let ended = page.run(&session, limits, is_over);
-    // What breaks the protocol is told so; another end leaves no one to be told.
-    if let Err(Error::Protocol(_) | Error::Capacity(_) | Error::Utf8(_)) = ended {
-        let code = match ended {
-            Err(Error::Capacity(_)) => CloseCode::Size,
-            Err(Error::Utf8(_)) => CloseCode::Invalid,
-            _ => CloseCode::Protocol,
-        };
-        let _ = page.socket.close(Some(CloseFrame { code, reason: "".into() }));
-        let _ = page.socket.flush();
+    match page.run(&session, limits, is_over) {
+        Ok(code) => page.part(code),
+        // After another error the client is gone, or takes nothing.
+        Err(error) => close_code(&error).into_iter().for_each(|code| page.part(Some(code))),
+    }
+}
+
+/// What a client is told that has made this error (RFC 6455 section 7.4.1); `None` when the error is
+/// not of its making.
+fn close_code(error: &Error) -> Option<CloseCode> {
+    match error {
+        Error::Protocol(_) => Some(CloseCode::Protocol),
+        Error::Io(error) if Wire::is_breach(error) => Some(CloseCode::Protocol),
+        Error::Capacity(_) => Some(CloseCode::Size),
+        Error::Utf8(_) => Some(CloseCode::Invalid),
+        _ => None,
     }
 }
 
@@ -83,7 +93,9 @@ fn is_full(error: &Error) -> bool {
 }
 
 impl Page {
-    fn run(&mut self, session: &str, limits: &Limits, is_over: &dyn Fn() -> bool) -> Result<(), Error> {
+    /// Serves until there is an end. Returns the code to close with; `None` when the client has
+    /// closed.
+    fn run(&mut self, session: &str, limits: &Limits, is_over: &dyn Fn() -> bool) -> Result<Option<CloseCode>, Error> {
         let hello = self.hub.hello(self.connection.client(), session, super::now());
         self.put(hello.into())?;
         let mut due = Instant::now();
@@ -116,17 +128,45 @@ impl Page {
             let wait = due.saturating_duration_since(Instant::now()).clamp(Duration::from_millis(1), LOOK);
             // On Windows writes do not wait after this either. What the client does not take is
             // flushed later.
-            wait_at_most(self.socket.get_ref(), wait)?;
+            wait_at_most(&self.socket.get_ref().stream, wait)?;
             match self.socket.read() {
                 Ok(Message::Text(text)) => self.hear(&text),
-                Ok(Message::Close(_)) => return Ok(()),
+                Ok(Message::Binary(_)) => return Ok(Some(CloseCode::Unsupported)),
+                Ok(Message::Close(_)) => return Ok(None),
                 Ok(_) => {}
                 Err(error) if is_full(&error) => {}
                 Err(error) => return Err(error),
             }
         }
-        let _ = self.socket.close(None);
-        self.socket.flush()
+        Ok(Some(CloseCode::Away))
+    }
+
+    /// Closes with this code, or answers the client's own, so that the client hears it: a connection
+    /// that is ended with bytes unread is reset, and what was said last may be lost.
+    fn part(&mut self, code: Option<CloseCode>) {
+        let until = Instant::now() + PART;
+        let mut said = match code {
+            Some(code) => self.socket.close(Some(CloseFrame { code, reason: "".into() })),
+            None => self.socket.flush(),
+        };
+        while said.is_err_and(|error| is_full(&error)) && Instant::now() < until {
+            said = self.socket.flush();
+        }
+        let stream = &mut self.socket.get_mut().stream;
+        if stream.shutdown(Shutdown::Write).is_err() {
+            return;
+        }
+        let mut rest = [0; 4096];
+        while let Some(left) = until.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
+            if wait_at_most(stream, left).is_err() {
+                return;
+            }
+            match stream.read(&mut rest) {
+                Ok(1..) => {}
+                Err(error) if has_only_waited(&error) => {}
+                _ => return,
+            }
+        }
     }
 
     /// Writes, or leaves it to a later flush.

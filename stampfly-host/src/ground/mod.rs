@@ -17,6 +17,7 @@ mod limits;
 mod page;
 mod pulse;
 mod server;
+mod wire;
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};

@@ -21,12 +21,12 @@ fn hub() -> Arc<Hub> {
     Hub::new(vec![card("one"), card("two")])
 }
 
-fn server(hub: &Arc<Hub>) -> Server {
+pub fn server(hub: &Arc<Hub>) -> Server {
     let limits = Limits { head: Duration::from_millis(300), stall: Duration::from_millis(700), ..Limits::default() };
     Server::start(hub.clone(), "127.0.0.1:0".parse().expect("an address"), limits).expect("a free port")
 }
 
-fn connect(address: SocketAddr) -> TcpStream {
+pub fn connect(address: SocketAddr) -> TcpStream {
     let stream = TcpStream::connect(address).expect("the server listens");
     stream.set_read_timeout(Some(SOON)).expect("a timeout");
     stream
@@ -51,15 +51,15 @@ fn say_for(address: SocketAddr, text: &str, time: Duration) -> String {
     String::from_utf8_lossy(&answer[..length]).into_owned()
 }
 
-fn get(address: SocketAddr, path: &str) -> String {
+pub fn get(address: SocketAddr, path: &str) -> String {
     say(address, &format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n"))
 }
 
-fn socket(address: SocketAddr) -> WebSocket<TcpStream> {
+pub fn socket(address: SocketAddr) -> WebSocket<TcpStream> {
     page(&address.to_string())
 }
 
-fn next(socket: &mut WebSocket<TcpStream>, kind: &str) -> Value {
+pub fn next(socket: &mut WebSocket<TcpStream>, kind: &str) -> Value {
     let until = Wall::now() + SOON;
     while Wall::now() < until {
         let Message::Text(text) = message(socket) else { continue };
@@ -71,7 +71,7 @@ fn next(socket: &mut WebSocket<TcpStream>, kind: &str) -> Value {
     panic!("no {kind}");
 }
 
-fn send(socket: &mut WebSocket<TcpStream>, value: &Value) {
+pub fn send(socket: &mut WebSocket<TcpStream>, value: &Value) {
     socket.send(Message::text(value.to_string())).expect("sent");
 }
 
@@ -135,7 +135,7 @@ fn what_is_foreign_slow_or_too_much_is_refused() {
 }
 
 /// A request for a WebSocket, as RFC 6455 has it.
-fn handshake() -> String {
+pub fn handshake() -> String {
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
     let asks = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13";
     format!("GET /ws HTTP/1.1\r\nHost: localhost\r\n{asks}\r\n{key}\r\n\r\n")

@@ -57,3 +57,4 @@ mod swap;
 mod thorough;
 mod tunes;
 mod verdicts;
+mod web_socket;
