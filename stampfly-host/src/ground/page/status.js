@@ -99,7 +99,6 @@ const writeLink = () => {
   node.title = 'Texts a second from the server, the time of the last answer, texts left out because this page was too slow';
 };
 
-const messages = [];
 /** What the vehicle and the server say, newest first. */
 const log = (text, kind = '') => {
   const list = element('messages');
@@ -108,7 +107,6 @@ const log = (text, kind = '') => {
   make('time', item, '', new Date().toLocaleTimeString());
   make('span', item, '', text);
   list.prepend(item);
-  messages.push(text);
   while (list.children.length > 100) list.lastChild.remove();
   if (kind === 'bad') setText(element('toast'), text);
 };
