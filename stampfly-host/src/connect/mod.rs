@@ -7,6 +7,7 @@
 //! | [`RadioPlace`] | where a vehicle in a network is, and the sealed frames that go there |
 //! | `way.rs` | one or the other |
 //! | `crew.rs` | which page and which program commands |
+//! | `talk.rs`, `budget.rs` | what pages are told, and how often |
 //! | `translation.rs` | what a cable says and what those frames say |
 //! | `questions.rs` | parameters and lines, asked until they are answered |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
@@ -15,6 +16,7 @@
 //! A line that is gone is opened again, for as long as it takes: vehicles are restarted, and cables
 //! pulled out. Pages are told.
 
+mod budget;
 mod crew;
 mod log;
 mod orders;
@@ -23,6 +25,7 @@ mod questions;
 mod record;
 mod sealed;
 pub mod station;
+mod talk;
 mod translation;
 mod way;
 
@@ -31,6 +34,7 @@ pub use sealed::{RadioPlace, RadioPlaceError};
 
 use crate::ground;
 use crate::serve::OpenPorts;
+use budget::Budget;
 use crew::Crew;
 use log::Log;
 use record::Record;
@@ -53,6 +57,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
+use talk::Talk;
 use translation::VEHICLE;
 use way::{Open, Way};
 
@@ -83,6 +88,9 @@ const TOLD: Duration = Duration::from_secs(1);
 const PERIOD: u16 = 40;
 /// Bytes of the line read at once.
 const PART: usize = 4096;
+/// A vehicle starts anew once a second at most, and begins a file then: some at once, because a line
+/// that was held up brings several starts together.
+const STARTS: Budget = Budget::new(4, stampfly_types::Duration::from_secs(1));
 
 /// How the line is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,12 +134,14 @@ struct Ends<V: Vehicle> {
     crew: Crew,
     /// Answers programs that another keeps out.
     answers: MavlinkWriter,
-    /// Who commands, as pages were told last.
-    commander: Option<(String, Option<u64>)>,
+    talk: Talk,
+    may_log: Budget,
     /// The place of `flight_status` among the topics.
     status: Option<usize>,
     /// The flight record, if it is wanted.
     record: Option<Record>,
+    /// Time since it began.
+    now: stampfly_types::Instant,
     /// The vehicle's newest instant.
     clock: stampfly_types::Instant,
     /// It has started anew.
@@ -181,10 +191,10 @@ impl<V: Vehicle> Ends<V> {
             Said::Frame(frame) => {
                 self.programs.keys().for_each(|client| self.ports.send(client, frame.bytes()));
                 if let Some(text) = told(frame) {
-                    self.hub.tell_all(ONLY, &Event::Text { text });
+                    self.talk.text(self.now, text);
                 }
             }
-            Said::Text(text) => self.hub.tell_all(ONLY, &Event::Text { text }),
+            Said::Text(text) => self.talk.text(self.now, text),
             Said::Foreign => {
                 let text =
                     "its firmware is not of this program's version: it can be killed from here, and nothing else";
@@ -195,9 +205,9 @@ impl<V: Vehicle> Ends<V> {
 
     fn chunk(&mut self, chunk: &[u8]) {
         if let Some(record) = &mut self.record
-            && let Err(error) = record.take(chunk)
+            && let Err(error) = record.take(self.now, chunk)
         {
-            self.hub.tell_all(ONLY, &Event::Text { text: format!("the flight record: {error}") });
+            self.talk.text(self.now, format!("the flight record: {error}"));
         }
     }
 
@@ -227,19 +237,23 @@ impl<V: Vehicle> Ends<V> {
     fn parameter(&mut self, index: usize, value: f32) {
         let value = f64::from(value);
         let Some((setting, known)) = self.settings.get_mut(index).zip(self.known.get_mut(index)) else { return };
-        if !*known || setting.value != value {
-            self.hub.tell_all(ONLY, &Event::Parameter { name: setting.name.to_owned(), value });
-        }
+        let is_news = !*known || setting.value != value;
         (setting.value, *known) = (value, true);
-        // With its parameters, so that the log says how it flew.
-        if self.log.is_none() && self.known.iter().all(|known| *known) {
+        if is_news {
+            self.talk.parameter(self.now, index, &self.settings);
+        }
+    }
+
+    /// Begins a log, when there is none and all parameters are known: the log says how it flew.
+    fn begin_log(&mut self) {
+        if self.log.is_none() && self.known.iter().all(|known| *known) && self.may_log.takes(self.now) {
             match Log::begin(&self.folder, self.logs, &self.settings, topics::<V>().len()) {
                 Ok(log) => {
                     let file = log.file.clone();
                     self.hub.provide_log(ONLY, move || file.so_far());
                     (self.log, self.logs) = (Some(log), self.logs + 1);
                 }
-                Err(text) => self.hub.tell_all(ONLY, &Event::Text { text }),
+                Err(text) => self.talk.text(self.now, text),
             }
         }
     }
@@ -288,15 +302,12 @@ impl<V: Vehicle> Ends<V> {
         });
     }
 
-    /// Tells pages who commands, when that has changed.
-    fn tell_commander(&mut self, now: stampfly_types::Instant) {
+    /// Time has passed: tells pages what is due, and begins a log.
+    fn pass(&mut self, now: stampfly_types::Instant) {
         self.crew.keep(now);
-        let commander = self.crew.commander(now);
-        if self.commander.as_ref() != Some(&commander) {
-            let (who, page) = commander.clone();
-            self.commander = Some(commander);
-            self.hub.tell_all(ONLY, &Event::Commander { who, page });
-        }
+        self.talk.commander(now, self.crew.commander(now));
+        self.talk.poll(now, &self.settings);
+        self.begin_log();
     }
 
     /// What of this goes to the vehicle. The page is told why nothing does.
@@ -375,6 +386,9 @@ impl<V: Vehicle> Bridge<V> {
         let known = vec![false; settings.len()];
         let station = Station::new(Instant::now(), topics::<V>(), settings.clone());
         let ends = Ends {
+            talk: Talk::new(hub.clone()),
+            may_log: STARTS,
+            now: stampfly_types::Instant::ZERO,
             hub,
             watch,
             ports,
@@ -386,7 +400,6 @@ impl<V: Vehicle> Bridge<V> {
             logs: 0,
             crew: Crew::default(),
             answers: MavlinkWriter::new(VEHICLE[0], VEHICLE[1]),
-            commander: None,
             status: topics::<V>().iter().position(|topic| topic.name == "flight_status"),
             record: None,
             clock: stampfly_types::Instant::ZERO,
@@ -464,9 +477,10 @@ impl<V: Vehicle> Bridge<V> {
                 Err(error) => return Some(error),
             };
             let now = Instant::now();
-            let Self { station, ends, shown, begun, .. } = self;
+            let passed = self.now();
+            let Self { station, ends, shown, .. } = self;
+            ends.now = passed;
             station.hear(now, part.get(..length).unwrap_or_default(), &mut |said| ends.take(said));
-            let passed = stampfly_types::Instant::from_micros(begun.elapsed().as_micros() as u64);
             let is_heard = is_up(station, now) && station.knows_time();
             let wall = ground::now();
             for (client, asked) in ends.hub.asks(ONLY, wall) {
@@ -483,7 +497,7 @@ impl<V: Vehicle> Bridge<V> {
             for page in ends.hub.gone(ONLY) {
                 ends.crew.leave(page.number());
             }
-            ends.tell_commander(passed);
+            ends.pass(passed);
             ends.programs(passed, station, Some(&mut put));
             if now.duration_since(looked) >= LOOK {
                 looked = now;

@@ -2,8 +2,10 @@
 //!
 //! Nothing of it is understood here; `stampfly replay` and `stampfly log` read it. A vehicle that starts anew counts its chunks from zero, and begins another file.
 
+use super::budget::Budget;
 use crate::serve::write_chunk;
 use stampfly_flight::compact::{ChunkError, MAGIC, Receiver};
+use stampfly_types::Instant;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -17,6 +19,7 @@ pub(super) struct Record {
     /// Of the files before this one.
     before: [u64; 2],
     starts: usize,
+    may_start: Budget,
 }
 
 fn begin(path: &Path) -> io::Result<BufWriter<File>> {
@@ -28,15 +31,17 @@ fn begin(path: &Path) -> io::Result<BufWriter<File>> {
 impl Record {
     /// Nothing has come yet.
     pub fn create(path: PathBuf) -> io::Result<Self> {
-        Ok(Self { file: begin(&path)?, path, receiver: Receiver::default(), before: [0; 2], starts: 0 })
+        let (receiver, may_start) = (Receiver::default(), super::STARTS);
+        Ok(Self { file: begin(&path)?, path, receiver, before: [0; 2], starts: 0, may_start })
     }
 
-    /// Takes a chunk. What is none, or damaged, is missing in the file.
-    pub fn take(&mut self, bytes: &[u8]) -> io::Result<()> {
+    /// Takes a chunk. What is none, or damaged, is missing in the file, and so is what comes from a
+    /// vehicle that starts anew more often than vehicles can.
+    pub fn take(&mut self, now: Instant, bytes: &[u8]) -> io::Result<()> {
         match self.receiver.take(bytes) {
             Ok(_) => {}
             // A line keeps the order: it counts anew.
-            Err(ChunkError::Late) => {
+            Err(ChunkError::Late) if self.may_start.takes(now) => {
                 self.begin_again()?;
                 _ = self.receiver.take(bytes);
             }
@@ -85,9 +90,9 @@ mod tests {
         std::fs::create_dir_all(&folder).expect("a folder");
         let mut record = Record::create(folder.join("flight.sfr")).expect("a file");
         for number in [0, 1, 3, 0, 1] {
-            record.take(&chunk(number)).expect("written");
+            record.take(Instant::ZERO, &chunk(number)).expect("written");
         }
-        record.take(b"no chunk").expect("passed over");
+        record.take(Instant::ZERO, b"no chunk").expect("passed over");
         record.flush().expect("written");
         assert_eq!(record.counts(), [5, 1]);
         for (name, expected) in

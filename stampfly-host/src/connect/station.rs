@@ -24,6 +24,11 @@ pub(super) const SYSTEM: u8 = 245;
 const COMPONENT: u8 = 190;
 /// What is not answered by then will not be: the longest answer of the console comes in a second, and begins at once.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// An answer that has not ended by then does not end: by radio, where parts are lost, the longest takes some ten seconds.
+const ENDED: Duration = Duration::from_secs(30);
+/// Bytes of an answer: as many as by radio, where two bytes say how many have come.
+const LONGEST_ANSWER: usize = u16::MAX as usize;
+const ENDLESS: &str = "the vehicle's answer does not end";
 /// Parameters that are asked for and not there yet: as many as the vehicle's desk has room for, less what a page may ask.
 const AHEAD: usize = 6;
 /// Lines of the console that wait for the one before.
@@ -72,6 +77,7 @@ struct Typed {
     number: u16,
     client: Client,
     asked: Asked,
+    since: Instant,
     answer: String,
 }
 
@@ -250,6 +256,10 @@ impl Station {
                 Some((typed, heard)) if typed.number == number => {
                     typed.answer.push_str(text);
                     *heard = now;
+                    let is_endless = typed.answer.len() > LONGEST_ANSWER || now.duration_since(typed.since) > ENDED;
+                    if let Some((Typed { client, asked, .. }, _)) = self.line.take_if(|_| is_endless) {
+                        return tell(Said::Answer(client, asked, Err(ENDLESS.into())));
+                    }
                     if let Some((Typed { client, asked, answer, .. }, _)) = self.line.take_if(|_| last) {
                         if answer.starts_with("one question after the other") {
                             // Of a station before this one, which was in the middle of something.
@@ -404,7 +414,9 @@ impl Station {
             && let Some((client, asked, line, since)) = self.lines.pop_front()
         {
             match self.say(since, &Payload::Line(&line), put) {
-                Some(number) => self.line = Some((Typed { number, client, asked, answer: String::new() }, now)),
+                Some(number) => {
+                    self.line = Some((Typed { number, client, asked, since: now, answer: String::new() }, now));
+                }
                 None => tell(Said::Answer(client, asked, Err("that cannot be typed".into()))),
             }
         }

@@ -28,6 +28,7 @@ mod foreign_log;
 mod ground;
 mod held;
 mod hil;
+mod hostile;
 mod impact;
 mod in_flight;
 mod late;
