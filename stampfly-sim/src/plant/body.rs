@@ -129,6 +129,14 @@ pub trait Airframe: Clone + fmt::Debug + PartialEq {
 
     /// Every parameter.
     fn list(&self) -> Vec<ParameterInfo>;
+
+    /// Are these numbers together a vehicle that can be simulated? By default yes.
+    ///
+    /// # Errors
+    /// [`ParameterError::Together`] with the reason.
+    fn check(&self) -> Result<(), ParameterError> {
+        Ok(())
+    }
 }
 
 impl Body for Plant {
@@ -195,5 +203,9 @@ impl Airframe for PlantParameters {
 
     fn list(&self) -> Vec<ParameterInfo> {
         self.iter().collect()
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
+        Self::check(self)
     }
 }

@@ -17,6 +17,7 @@
 mod aeroplane;
 mod battery;
 mod body;
+mod check;
 mod ground;
 mod motion;
 mod motor;
@@ -28,6 +29,7 @@ mod wind;
 pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};
 pub use battery::{Battery, BatterySpec};
 pub use body::{Airframe, Body, Disturbance};
+pub use check::FullThrottle;
 pub use ground::Ground;
 pub use motion::Motion;
 pub use motor::{ROTORS, RotorFault, Rotors};

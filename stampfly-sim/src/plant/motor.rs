@@ -78,7 +78,7 @@ impl Rotors {
         let p = parameters;
         let spread = p.manufacturing_spread;
         let per_volt = p.torque_coefficient / p.motor_voltage_a;
-        let motor_constant = per_volt * p.motor_resistance;
+        let motor_constant = p.motor_constant();
         // One propeller in three hundred is 6 % off; the centre of mass lies within a millimetre.
         let thrust_coefficient = [(); ROTORS].map(|()| p.thrust_coefficient * (1.0 + 0.02 * spread * noise.normal()));
         let centre = (0.0004 * spread * noise.normal(), 0.0004 * spread * noise.normal());

@@ -1,6 +1,6 @@
 //! Parameters of a plant as a table: each with name, unit, range and meaning, settable by name.
 //!
-//! The macro declares the structure and its `EXAMPLE`. For what an airframe is made of; not for the flight stack's parameters, which have no
+//! The macro declares the structure and one constant of it. For what an airframe is made of; not for the flight stack's parameters, which have no
 //! heap and a store.
 
 use core::fmt;
@@ -33,6 +33,8 @@ pub enum ParameterError {
         /// The smallest and largest value accepted.
         range: (f64, f64),
     },
+    /// Each number is in its range, but together they are no vehicle, or none that can be simulated.
+    Together(String),
 }
 
 impl fmt::Display for ParameterError {
@@ -40,6 +42,7 @@ impl fmt::Display for ParameterError {
         match self {
             Self::Unknown(name) => write!(f, "there is no plant parameter {name:?}"),
             Self::OutOfRange { name, range: (low, high) } => write!(f, "{name} must lie between {low} and {high}"),
+            Self::Together(reason) => f.write_str(reason),
         }
     }
 }
@@ -47,7 +50,7 @@ impl fmt::Display for ParameterError {
 impl std::error::Error for ParameterError {}
 
 macro_rules! parameters {
-    ($(#[$meta:meta])* $Name:ident, $(#[$example_meta:meta])* EXAMPLE { $($field:ident = $example:literal [$unit:literal] in $low:literal ..= $high:literal, $description:literal;)* }) => {
+    ($(#[$meta:meta])* $Name:ident, $(#[$example_meta:meta])* $EXAMPLE:ident { $($field:ident = $example:literal [$unit:literal] in $low:literal ..= $high:literal, $description:literal;)* }) => {
         $(#[$meta])*
         #[derive(Clone, Debug, PartialEq)]
         pub struct $Name {
@@ -56,7 +59,7 @@ macro_rules! parameters {
 
         impl $Name {
             $(#[$example_meta])*
-            pub const EXAMPLE: Self = Self { $($field: $example),* };
+            pub const $EXAMPLE: Self = Self { $($field: $example),* };
 
             /// Sets a parameter by name.
             ///

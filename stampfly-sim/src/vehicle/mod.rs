@@ -232,7 +232,7 @@ impl Options {
     /// Changes of the world what these options say of it: vibration, wind, gusts, the simulated vehicle.
     ///
     /// # Errors
-    /// When a number makes no sense, or has no name.
+    /// When a number makes no sense, or has no name, or when the numbers are no vehicle together.
     pub fn change<A: Airframe>(&self, simulation: &mut SimulationConfig<A>) -> Result<(), SetupError> {
         if let Some(vibration) = self.vibration {
             simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
@@ -249,7 +249,8 @@ impl Options {
             let (name, value) = assignment(text)?;
             simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
-        Ok(())
+        // In any order, so what they are together is looked at when all are there.
+        simulation.plant.check().map_err(|error| format!("--plant {error}"))
     }
 
     /// Names and values of [`param`](Self::param).
