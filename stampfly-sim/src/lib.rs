@@ -4,6 +4,7 @@
 //! A simulated vehicle behind the same traits as a real one.
 //!
 //! * [`time`]: virtual time and a deterministic executor;
+//! * [`Conditions`]: how worn, how far from the next specimen, over what floor and in what light;
 //! * [`plant`]: the vehicle as a body with motors, a battery, the ground and the air: a quadrotor, an aeroplane, or one of your own;
 //! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
 //! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
@@ -27,6 +28,7 @@
 
 pub mod ask;
 pub mod chips;
+mod conditions;
 pub mod fault;
 #[cfg(feature = "ground")]
 pub mod ground;
@@ -50,6 +52,7 @@ pub mod watched;
 mod world;
 
 /// The vectors and rotations of a [`plant`].
+pub use conditions::Conditions;
 pub use nalgebra;
 pub use noise::Noise;
 pub use rms::Rms;

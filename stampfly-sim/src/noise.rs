@@ -28,6 +28,7 @@ pub(crate) enum Stream {
     SoftIron = 13,
     Gnss = 14,
     Airspeed = 15,
+    Conditions = 16,
 }
 
 /// A seeded stream of random numbers.

@@ -1,6 +1,7 @@
 //! A vehicle ready to fly: the world, the clock and the chips, made from one configuration and one seed.
 
-use crate::plant::{Airframe, Body, PlantParameters, Pose, WindConfig};
+use crate::conditions::Conditions;
+use crate::plant::{Airframe, Body, ParameterError, ParameterInfo, PlantParameters, Pose, WindConfig};
 use crate::sensors::Sensors;
 use crate::time::Clock;
 use crate::world::{Truth, World};
@@ -17,6 +18,8 @@ pub struct SimulationConfig<A = PlantParameters> {
     pub plant: A,
     /// The air.
     pub wind: WindConfig,
+    /// What else it meets, beside the air: its battery's age, the light, how far specimens lie apart.
+    pub conditions: Conditions,
     /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
     pub vibration: f64,
     /// Strength of what the sensors of the recorded flights do not show: drift with temperature, and soft iron. 1 is what data sheets
@@ -35,12 +38,51 @@ impl<A: Airframe> SimulationConfig<A> {
             start: Instant::ZERO,
             plant,
             wind: WindConfig::default(),
+            conditions: Conditions::GENTLE,
             vibration: 1.0,
             imperfections: 0.0,
             pose: None,
         }
     }
+
+    /// The same in the [harsh](Conditions::harsh) world of its seed, with a battery that carries a fifth more than the vehicle weighs: one that
+    /// carries less people put aside.
+    #[must_use]
+    pub fn in_harsh_world(self) -> Self {
+        let conditions =
+            Conditions::harsh(self.seed, |conditions| self.plant.under(conditions, self.seed).lift() >= SPARE_LIFT);
+        Self { conditions, ..self }
+    }
+
+    /// Sets a number of the vehicle or, if it has none of this name, of the conditions.
+    ///
+    /// # Errors
+    /// When there is no such number or the value makes no sense; nothing changes then.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        match self.plant.set(name, value) {
+            Err(ParameterError::Unknown(_)) => self.conditions.set(name, value),
+            set => set,
+        }
+    }
+
+    /// Every number that [`set`](Self::set) takes.
+    #[must_use]
+    pub fn list(&self) -> Vec<ParameterInfo> {
+        self.plant.list().into_iter().chain(self.conditions.iter()).collect()
+    }
+
+    /// Are these numbers together a vehicle that can be simulated?
+    ///
+    /// # Errors
+    /// [`ParameterError::Together`] with the reason.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.plant.under(&self.conditions, self.seed).check()
+    }
 }
+
+/// What a battery has to lift that somebody flies with, in weights, at full throttle: 30° of lean need 1.15 to hold the height, and the rest is
+/// what a flight drains.
+const SPARE_LIFT: f64 = 1.2;
 
 impl SimulationConfig {
     /// [`PlantParameters::EXAMPLE`], a vehicle that nobody built: for examples and tests.
@@ -90,8 +132,10 @@ impl Simulation {
     #[must_use]
     pub fn new<A: Airframe>(config: &SimulationConfig<A>) -> Self {
         let clock = Clock::new(config.start);
-        let body = config.plant.body(&config.wind, config.pose.as_ref(), config.seed);
-        let world = World::new(body, config.start).with_imperfections(config.imperfections);
+        let body = config.plant.body_under(&config.conditions, &config.wind, config.pose.as_ref(), config.seed);
+        let world = World::new(body, config.start)
+            .with_imperfections(config.imperfections)
+            .with_conditions(config.conditions.clone());
         let sensors = Sensors::new(&world, &clock, config.seed, config.vibration);
         Self { clock, world, sensors }
     }

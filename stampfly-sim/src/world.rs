@@ -4,6 +4,7 @@
 //! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
 //! one has already been read later. Many worlds fit in one process; none knows of another.
 
+use crate::conditions::Conditions;
 use crate::plant::{Body, DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
 use crate::specimen::Specimen;
 use core::any::Any;
@@ -57,6 +58,7 @@ struct State {
     history: Box<[Motion; HISTORY]>,
     /// Of the sensors.
     imperfections: f64,
+    conditions: Conditions,
     specimen: Specimen,
     /// Warmer than it is by itself: from what to what, K, from when on and for how long.
     warmth: (f64, f64, Instant, Duration),
@@ -128,6 +130,7 @@ impl World {
             steps: 0,
             history,
             imperfections: 0.0,
+            conditions: Conditions::GENTLE,
             specimen: Specimen::default(),
             warmth: (0.0, 0.0, start, Duration::ZERO),
         })))
@@ -137,6 +140,13 @@ impl World {
     #[must_use]
     pub fn with_imperfections(self, strength: f64) -> Self {
         self.0.borrow_mut().imperfections = strength;
+        self
+    }
+
+    /// The same under these conditions, as far as sensors meet them. What a body meets of them it is [made with](crate::plant::Airframe::body_under).
+    #[must_use]
+    pub fn with_conditions(self, conditions: Conditions) -> Self {
+        self.0.borrow_mut().conditions = conditions;
         self
     }
 

@@ -191,10 +191,7 @@ impl Vehicle for StampFly {
     }
 
     fn plant(setup: &Setup) -> Vec<Setting> {
-        let rows = setup.simulation.plant.iter();
-        let settings =
-            rows.map(|row| Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description });
-        settings.collect()
+        vehicle::table::simulation(&setup.simulation)
     }
 }
 

@@ -11,7 +11,7 @@ use crate::vehicles::DEFAULT;
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
-use stampfly_sim::vehicle::{Options, Variety, Vehicle};
+use stampfly_sim::vehicle::{Options, Variety, Vehicle, WorldKind};
 use stampfly_types::Duration;
 
 /// Random number stream of campaigns; those of vehicles, missions and faults are others.
@@ -240,12 +240,15 @@ pub fn shell_line(words: &[String]) -> String {
 /// Options that a campaign does not vary.
 #[must_use]
 pub fn rest(options: &Options) -> Vec<String> {
-    let Options { plant, param, wind, cameras, .. } = options;
+    let Options { plant, world, param, wind, cameras, .. } = options;
     let named = |name: &str, values: &[String]| -> Vec<String> {
         // Without the spaces that may stand around `=`: they part the words of a row.
         values.iter().flat_map(|value| [format!("--{name}"), value.split_whitespace().collect()]).collect()
     };
     let mut words = named("plant", plant);
+    if *world != WorldKind::default() {
+        words.extend(["--world".into(), world.to_string()]);
+    }
     words.extend(named("param", param));
     words.extend(wind.iter().flat_map(|[north, east]| ["--wind".into(), format!("{north},{east}")]));
     words.extend(cameras.then(|| "--cameras".into()));

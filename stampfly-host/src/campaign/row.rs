@@ -252,10 +252,13 @@ impl Row {
             let mut value = || settings.next().ok_or_else(|| format!("settings: {name} has no value"));
             match name {
                 "--plant" => options.plant.push(value()?.into()),
+                "--world" => options.world = value()?.parse().map_err(|error| format!("settings: --world {error}"))?,
                 "--param" => options.param.push(value()?.into()),
                 "--wind" => options.wind = Some(wind(value()?).ok_or("settings: --wind is no pair of numbers")?),
                 "--cameras" => options.cameras = true,
-                other => return Err(format!("settings: {other} is none of --plant, --param, --wind, --cameras")),
+                other => {
+                    return Err(format!("settings: {other} is none of --plant, --world, --param, --wind, --cameras"));
+                }
             }
         }
         Ok(Case { vehicle: self.vehicle.clone(), index: self.index, seed: self.seed, options })

@@ -6,7 +6,7 @@
 
 use super::case::Case;
 use stampfly_sim::fault::{Fault, Moment, When};
-use stampfly_sim::vehicle::Vehicle;
+use stampfly_sim::vehicle::{Vehicle, WorldKind};
 use stampfly_types::Duration;
 
 /// Most flights that are flown to make one smaller.
@@ -62,6 +62,7 @@ fn smaller<V: Vehicle>(case: &Case) -> Vec<Case> {
     change(&|case| case.options.wind = None);
     change(&|case| case.options.gust = Some(0.0));
     change(&|case| case.options.vibration = Some(0.0));
+    change(&|case| case.options.world = WorldKind::default());
     change(&|case| case.options.plant.clear());
     change(&|case| case.options.param.clear());
     for (place, text) in faults.iter().enumerate() {

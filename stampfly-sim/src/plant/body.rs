@@ -7,6 +7,7 @@ use super::{
     Battery, GRAVITY, Motion, ParameterError, ParameterInfo, Plant, PlantParameters, Pose, ROTORS, RotorFault,
 };
 use super::{Scene, WindConfig};
+use crate::conditions::Conditions;
 use core::any::Any;
 use core::fmt;
 use nalgebra::Vector3;
@@ -121,6 +122,23 @@ pub trait Airframe: Clone + fmt::Debug + PartialEq {
     /// A body in this air at `pose`; `None` stands it on the ground at the origin, facing north. `seed` is of everything random.
     fn body(&self, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self::Body;
 
+    /// The same numbers under these conditions, as far as they can say it: the battery worn and cold, the specimen of this seed as heavy as it
+    /// is. By default as they are.
+    #[must_use]
+    fn under(&self, _conditions: &Conditions, _seed: u64) -> Self {
+        self.clone()
+    }
+
+    /// The [body](Self::body) under these conditions. By default of the numbers that are [under](Self::under) them.
+    fn body_under(&self, conditions: &Conditions, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self::Body {
+        self.under(conditions, seed).body(wind, pose, seed)
+    }
+
+    /// What its rotors carry at full throttle, in weights. By default there is no limit: not every vehicle is carried by rotors.
+    fn lift(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Sets a parameter by name.
     ///
     /// # Errors
@@ -195,6 +213,14 @@ impl Airframe for PlantParameters {
 
     fn body(&self, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Plant {
         Plant::new(self, wind, pose, seed)
+    }
+
+    fn under(&self, conditions: &Conditions, seed: u64) -> Self {
+        Self::under(self, conditions, seed)
+    }
+
+    fn lift(&self) -> f64 {
+        self.full_throttle().lift
     }
 
     fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {

@@ -23,7 +23,8 @@ mod motion;
 mod motor;
 mod parameters;
 mod scene;
-mod table;
+pub(crate) mod table;
+mod wear;
 mod wind;
 
 pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};

@@ -5,6 +5,7 @@
 
 use super::battery::BatterySpec;
 use super::table::parameters;
+use crate::conditions::Conditions;
 
 parameters! {
     /// Airframe, motors, propellers, battery, ground and air of a quadrotor in X.
@@ -60,6 +61,19 @@ parameters! {
 }
 
 impl PlantParameters {
+    /// The same under these conditions: what they do to its battery.
+    #[must_use]
+    pub fn under(&self, conditions: &Conditions, _seed: u64) -> Self {
+        let battery = self.battery().worn(conditions.battery_age).at(conditions.battery_temperature);
+        Self {
+            battery_charge: battery.charge * (1.0 - conditions.battery_drained),
+            battery_capacity: battery.capacity,
+            battery_resistance: battery.resistance,
+            battery_polarisation: battery.polarisation,
+            ..self.clone()
+        }
+    }
+
     pub(super) fn battery(&self) -> BatterySpec {
         BatterySpec {
             cells: self.battery_cells,

@@ -92,4 +92,4 @@ macro_rules! parameters {
     };
 }
 
-pub(super) use parameters;
+pub(crate) use parameters;

@@ -188,6 +188,50 @@ pub struct NoFindings {}
 /// Why a flight cannot be set up: a sentence for whoever typed the options.
 pub type SetupError = String;
 
+/// How kind the world is to a flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WorldKind {
+    /// [`Conditions::GENTLE`](crate::Conditions::GENTLE).
+    #[default]
+    Gentle,
+    /// [`Conditions::harsh`](crate::Conditions::harsh), of each flight's seed.
+    Harsh,
+}
+
+impl WorldKind {
+    /// Its name, as it is typed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gentle => "gentle",
+            Self::Harsh => "harsh",
+        }
+    }
+
+    fn is_gentle(&self) -> bool {
+        *self == Self::Gentle
+    }
+}
+
+impl fmt::Display for WorldKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl core::str::FromStr for WorldKind {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let kinds = [Self::Gentle, Self::Harsh];
+        kinds
+            .into_iter()
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| format!("'{name}' is neither gentle nor harsh"))
+    }
+}
+
 /// Options of a flight as they are typed. A vehicle refuses what it has no use for.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -196,6 +240,9 @@ pub struct Options {
     pub mission: Option<String>,
     /// `NAME=VALUE` of the simulated vehicle or its surroundings.
     pub plant: Vec<String>,
+    /// How kind the world is. What [`plant`](Self::plant) names it does not decide.
+    #[serde(skip_serializing_if = "WorldKind::is_gentle")]
+    pub world: WorldKind,
     /// `NAME=VALUE` of the flight stack's parameters.
     pub param: Vec<String>,
     /// Strength of vibration; 1 is what was recorded.
@@ -229,11 +276,15 @@ impl Options {
         faults.collect::<Result<_, _>>().map_err(|error| format!("--fault {error}"))
     }
 
-    /// Changes of the world what these options say of it: vibration, wind, gusts, the simulated vehicle.
+    /// Changes of the world what these options say of it: how kind it is, vibration, wind, gusts, the simulated vehicle. The seed is the
+    /// simulation's.
     ///
     /// # Errors
     /// When a number makes no sense, or has no name, or when the numbers are no vehicle together.
     pub fn change<A: Airframe>(&self, simulation: &mut SimulationConfig<A>) -> Result<(), SetupError> {
+        if self.world == WorldKind::Harsh {
+            *simulation = simulation.clone().in_harsh_world();
+        }
         if let Some(vibration) = self.vibration {
             simulation.vibration = within("--vibration", vibration, 0.0, 20.0)?;
         }
@@ -247,10 +298,10 @@ impl Options {
         }
         for text in &self.plant {
             let (name, value) = assignment(text)?;
-            simulation.plant.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+            simulation.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
         // In any order, so what they are together is looked at when all are there.
-        simulation.plant.check().map_err(|error| format!("--plant {error}"))
+        simulation.check().map_err(|error| format!("--plant {error}"))
     }
 
     /// Names and values of [`param`](Self::param).

@@ -3,7 +3,8 @@
 //! A [`Vehicle`](super::Vehicle) hands its functions about parameters here. Not for a configuration that is more than a table, as the StampFly's.
 
 use super::{Setting, SetupError};
-use crate::plant::Airframe;
+use crate::SimulationConfig;
+use crate::plant::{Airframe, ParameterInfo};
 use stampfly_log::ulog::ParameterValue;
 use stampfly_param::ParameterTable;
 
@@ -43,6 +44,15 @@ pub fn range<P: ParameterTable>(name: &str) -> Option<[f64; 2]> {
 /// Every number of a simulated airframe.
 #[must_use]
 pub fn airframe(airframe: &impl Airframe) -> Vec<Setting> {
-    let rows = airframe.list().into_iter();
-    rows.map(|row| Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description }).collect()
+    airframe.list().into_iter().map(setting).collect()
+}
+
+/// Every number of a simulated airframe and of the conditions under which it flies.
+#[must_use]
+pub fn simulation<A: Airframe>(simulation: &SimulationConfig<A>) -> Vec<Setting> {
+    simulation.list().into_iter().map(setting).collect()
+}
+
+fn setting(row: ParameterInfo) -> Setting {
+    Setting { name: row.name, value: row.value, unit: row.unit, meaning: row.description }
 }

@@ -5,6 +5,7 @@ mod aeroplane;
 mod agreement;
 mod chips;
 mod compensation;
+mod conditions;
 mod determinism;
 mod drivers;
 mod hover;

@@ -3,7 +3,7 @@
 use super::VehicleOption;
 use crate::command_line::failure::Failure;
 use clap::Args;
-use stampfly_sim::vehicle::{Live, Options, Vehicle};
+use stampfly_sim::vehicle::{Live, Options, Vehicle, WorldKind};
 use std::path::PathBuf;
 
 /// What decides a simulated flight.
@@ -18,6 +18,10 @@ pub struct SceneOptions {
     /// Change a number of the simulated vehicle or its surroundings (see `--list`).
     #[arg(long, value_name = "NAME=VALUE")]
     pub plant: Vec<String>,
+    /// How kind the world is: `harsh` draws from the seed how worn and cold the battery is, the light, the floor, the room, and how far this
+    /// specimen lies from others, as far apart as recordings and data sheets are.
+    #[arg(long, value_name = "gentle|harsh", default_value_t)]
+    pub world: WorldKind,
     /// Change a parameter of the flight stack (see `--list`).
     #[arg(long, value_name = "NAME=VALUE")]
     pub param: Vec<String>,
@@ -69,7 +73,7 @@ pub struct FlyOptions {
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
     /// Fly a flight of a campaign again, and compare its hash: exit code 1 when it is another.
-    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "jitter", "seed"])]
+    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "world", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "jitter", "seed"])]
     pub from: Option<PathBuf>,
     /// Which one: its row in the file, from 0.
     #[arg(long, value_name = "N", requires = "from")]
@@ -98,10 +102,24 @@ impl SceneOptions {
 
     /// The same as a vehicle takes them.
     pub fn options(&self, jitter: Option<u64>) -> Options {
-        let Self { mission, plant, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
+        let Self { mission, plant, world, param, vibration, gust, wind, chips, cameras, fault, pilot, mode, .. } =
             self.clone();
         let pilot = pilot.then(|| mode.unwrap_or_default());
-        Options { mission, plant, param, vibration, gust, wind, chips, cameras, jitter, fault, pilot, live: None }
+        Options {
+            mission,
+            plant,
+            world,
+            param,
+            vibration,
+            gust,
+            wind,
+            chips,
+            cameras,
+            jitter,
+            fault,
+            pilot,
+            live: None,
+        }
     }
 
     /// Prints what can be changed.

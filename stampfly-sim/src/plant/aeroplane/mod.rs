@@ -21,6 +21,7 @@ pub use trim::{Trim, TrimError};
 
 use super::{Airframe, Battery, Body, DT, Disturbance, Motion, ParameterError, ParameterInfo, Pose, ROTORS};
 use super::{RotorFault, Wind, WindConfig};
+use crate::conditions::Conditions;
 use crate::noise::{Noise, Stream};
 use aerodynamics::{Flow, Warp};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -306,6 +307,10 @@ impl Airframe for AeroplaneParameters {
 
     fn body(&self, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Aeroplane {
         Aeroplane::new(self, wind, pose, seed)
+    }
+
+    fn under(&self, conditions: &Conditions, _seed: u64) -> Self {
+        Self::under(self, conditions)
     }
 
     fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {

@@ -1,5 +1,6 @@
 //! What an aeroplane is made of: one table, settable by name, and an example with the sources of its numbers.
 
+use crate::conditions::Conditions;
 use crate::plant::battery::BatterySpec;
 use crate::plant::table::parameters;
 
@@ -181,6 +182,19 @@ impl AeroplaneParameters {
         battery_polarisation: 0.008,
         ..Self::EXAMPLE
     };
+
+    /// The same under these conditions: what they do to its battery.
+    #[must_use]
+    pub fn under(&self, conditions: &Conditions) -> Self {
+        let battery = self.battery().worn(conditions.battery_age).at(conditions.battery_temperature);
+        Self {
+            battery_charge: battery.charge * (1.0 - conditions.battery_drained),
+            battery_capacity: battery.capacity,
+            battery_resistance: battery.resistance,
+            battery_polarisation: battery.polarisation,
+            ..self.clone()
+        }
+    }
 
     pub(super) fn battery(&self) -> BatterySpec {
         BatterySpec {

@@ -126,6 +126,6 @@ impl Vehicle for Plane {
     }
 
     fn plant(setup: &Setup) -> Vec<Setting> {
-        table::airframe(&setup.simulation.plant)
+        table::simulation(&setup.simulation)
     }
 }

@@ -14,7 +14,8 @@ use stampfly_log::ulog::ParameterValue;
 use stampfly_param::ParameterTable;
 use stampfly_sim::Noise;
 use stampfly_sim::vehicle::{
-    self, Ended, FlightOptions, Options, Page, PortSpec, Script, Scripted, Setting, SetupError, Vehicle, Witness, table,
+    self, Ended, FlightOptions, Options, Page, PortSpec, Script, Scripted, Setting, SetupError, Vehicle, Witness,
+    WorldKind, table,
 };
 use stampfly_types::{Duration, Instant};
 use std::prelude::v1::*;
@@ -38,13 +39,20 @@ impl Vehicle for Rover {
     type Outcome = Drive;
 
     fn setup(options: &Options, seed: u64) -> Result<Setup, SetupError> {
-        let Options { mission, plant, vibration, gust, wind, chips, cameras, jitter, live, pilot, .. } = options;
+        let Options { mission, plant, world, vibration, gust, wind, chips, cameras, jitter, live, pilot, .. } = options;
         options.faults(Self::FAULTS)?;
         if pilot.is_some() {
             return Err("the rover has no pilot: its missions say who drives".into());
         }
-        if !plant.is_empty() || vibration.is_some() || gust.is_some() || wind.is_some() || *chips || *cameras {
-            return Err("the rover has no plant, vibration, wind, chips or cameras".into());
+        if !plant.is_empty()
+            || *world != WorldKind::Gentle
+            || vibration.is_some()
+            || gust.is_some()
+            || wind.is_some()
+            || *chips
+            || *cameras
+        {
+            return Err("the rover has no plant, harsh world, vibration, wind, chips or cameras".into());
         }
         let mut parameters = Parameters::default();
         let mut noise = Noise::new(seed, STREAM);

@@ -130,6 +130,6 @@ impl Vehicle for Stm32Quad {
     }
 
     fn plant(setup: &Setup) -> Vec<Setting> {
-        table::airframe(&setup.simulation.plant)
+        table::simulation(&setup.simulation)
     }
 }
