@@ -29,6 +29,9 @@ pub(crate) enum Stream {
     Gnss = 14,
     Airspeed = 15,
     Conditions = 16,
+    Frame = 17,
+    ImuMounting = 18,
+    RotorSpecimen = 25,
 }
 
 /// A seeded stream of random numbers.

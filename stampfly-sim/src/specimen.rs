@@ -10,6 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 pub struct Specimen {
     /// Accelerometer: scale and misalignment.
     pub accel_matrix: Matrix3<f64>,
+    /// Accelerometer: its place, from the centre of mass, body, m.
+    pub lever: Vector3<f64>,
     /// Accelerometer: offset at the beginning and at 25 °C, m/s².
     pub accel_bias: Vector3<f64>,
     /// Accelerometer: change of the offset, m/s² a kelvin.
@@ -30,6 +32,7 @@ impl Default for Specimen {
         let (none, straight) = (Vector3::zeros(), Matrix3::identity());
         Self {
             accel_matrix: straight,
+            lever: none,
             accel_bias: none,
             accel_drift: none,
             gyro_bias: none,

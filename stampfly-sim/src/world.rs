@@ -97,6 +97,7 @@ impl State {
 pub(crate) struct Inertial {
     pub specific_force: Vector3<f64>,
     pub rate: Vector3<f64>,
+    pub angular_acceleration: Vector3<f64>,
     pub rotor_speed: [f64; ROTORS],
 }
 
@@ -148,6 +149,10 @@ impl World {
     pub fn with_conditions(self, conditions: Conditions) -> Self {
         self.0.borrow_mut().conditions = conditions;
         self
+    }
+
+    pub(crate) fn conditions(&self) -> Conditions {
+        self.0.borrow().conditions.clone()
     }
 
     /// The same in another magnetic field than Kanazawa's, world NED, µT.
@@ -249,6 +254,7 @@ impl World {
         Inertial {
             specific_force: motion.specific_force,
             rate: motion.rate_after(rest),
+            angular_acceleration: motion.angular_acceleration,
             rotor_speed: motion.rotor_speed,
         }
     }

@@ -30,6 +30,20 @@ parameters! {
         battery_age = 0.0 ["1"] in 0.0 ..= 1.5, "Wear of the battery: 0 is new, 1 at the end of its life.";
         battery_temperature = 25.0 ["degC"] in -20.0 ..= 60.0, "Temperature of the battery.";
         battery_drained = 0.0 ["1"] in 0.0 ..= 1.0, "Share of the charge that is gone at the start.";
+
+        mass_spread = 0.0 ["1"] in 0.0 ..= 0.2, "Bound of the share by which vehicles differ in mass.";
+        inertia_spread = 0.0 ["1"] in 0.0 ..= 0.3, "Bound of the share by which vehicles differ in each moment of inertia.";
+        thrust_spread = 0.0 ["1"] in 0.0 ..= 0.2, "Bound of the share by which the propellers of one vehicle push more than those of another.";
+        rotor_spread = 0.02 ["1"] in 0.0 ..= 0.1, "Standard deviation of the share by which one rotor of a vehicle pushes more than the next.";
+        centre_spread = 0.0004 ["m"] in 0.0 ..= 0.004, "Standard deviation of the centre of mass from the middle of the rotors, along x and along y.";
+        rotor_curve_spread = 0.0 ["1"] in 0.0 ..= 0.1, "Standard deviation of the share by which each motor's constant and resistance differ from the next one's.";
+        rotor_place_spread = 0.0 ["m"] in 0.0 ..= 0.005, "Standard deviation of each rotor's place, along x and along y.";
+        rotor_lag_spread = 0.0 ["1"] in 0.0 ..= 0.6, "Bound of the share by which the rotors of one vehicle are heavier to turn than those of another.";
+        collective_lag = 0.0 ["s"] in 0.0 ..= 0.2, "Lag of the lift behind the rotors' thrust.";
+        spread_limit = 10.0 ["1"] in 1.0 ..= 10.0, "Rotors and centres of mass lie no more standard deviations apart than this.";
+        imu_misalignment = 0.0 ["rad"] in 0.0 ..= 0.1, "Bound of the angle about each axis by which the inertial sensor is soldered askew.";
+        imu_scale = 0.0 ["1"] in 0.0 ..= 0.05, "Bound of the share by which each axis of the inertial sensor measures too much, beyond half a per cent.";
+        imu_lever = 0.0 ["m"] in 0.0 ..= 0.05, "Bound of the distance of the inertial sensor from the centre of mass, along each axis.";
     }
 }
 

@@ -219,6 +219,10 @@ impl Airframe for PlantParameters {
         Self::under(self, conditions, seed)
     }
 
+    fn body_under(&self, conditions: &Conditions, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Plant {
+        Plant::under(self, conditions, wind, pose, seed)
+    }
+
     fn lift(&self) -> f64 {
         self.full_throttle().lift
     }

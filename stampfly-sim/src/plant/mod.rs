@@ -19,6 +19,7 @@ mod battery;
 mod body;
 mod check;
 mod ground;
+mod lag;
 mod motion;
 mod motor;
 mod parameters;
@@ -39,6 +40,7 @@ pub use scene::{Beyond, Hand, Scene};
 pub use table::{ParameterError, ParameterInfo};
 pub use wind::{Wind, WindConfig, WindProfile};
 
+use crate::conditions::Conditions;
 use crate::noise::{Noise, Stream};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use stampfly_types::Duration;
@@ -99,8 +101,20 @@ impl Plant {
     /// A vehicle at `pose`; `None` stands it on the floor at the origin, facing north.
     #[must_use]
     pub fn new(parameters: &PlantParameters, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self {
-        let p = parameters;
-        let mut rotors = Rotors::new(p, &mut Noise::stream(seed, Stream::Airframe));
+        Self::under(parameters, &Conditions::GENTLE, wind, pose, seed)
+    }
+
+    /// The same under these conditions.
+    #[must_use]
+    pub fn under(
+        parameters: &PlantParameters,
+        conditions: &Conditions,
+        wind: &WindConfig,
+        pose: Option<&Pose>,
+        seed: u64,
+    ) -> Self {
+        let p = &parameters.under(conditions, seed);
+        let mut rotors = Rotors::new(p, conditions, seed);
         let standing = Pose::standing(p, 0.0);
         let pose = pose.unwrap_or(&standing);
         rotors.set_speed([pose.rotors * rotors.hover_speed(); ROTORS]);

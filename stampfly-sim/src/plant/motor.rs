@@ -12,8 +12,10 @@
 //! measured fixes them for a given resistance (set dω/dt = 0 and compare powers of ω). The winding's inductance
 //! is left out, its time constant being some ten microseconds.
 
-use super::PlantParameters;
-use crate::noise::Noise;
+use super::lag::Lag;
+use super::{DT, PlantParameters};
+use crate::conditions::Conditions;
+use crate::noise::{Noise, Stream};
 use nalgebra::Vector3;
 use stampfly_types::GRAVITY;
 
@@ -21,7 +23,7 @@ use stampfly_types::GRAVITY;
 pub const ROTORS: usize = 4;
 
 /// Where the rotors sit, in units of the rotor offset: front right, rear right, rear left, front left (x, y).
-const PLACES: [(f64, f64); ROTORS] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+pub(super) const PLACES: [(f64, f64); ROTORS] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
 
 /// Which way they turn about the body's z axis (down): −1 is counter-clockwise seen from above.
 const SPINS: [f64; ROTORS] = [-1.0, 1.0, -1.0, 1.0];
@@ -61,39 +63,56 @@ pub struct Rotors {
     /// Of healthy propellers.
     thrust_coefficient: [f64; ROTORS],
     torque_coefficient: f64,
-    resistance: f64,
-    motor_constant: f64,
+    resistance: [f64; ROTORS],
+    motor_constant: [f64; ROTORS],
     viscous: f64,
     friction: f64,
     inertia: f64,
     faults: [RotorFault; ROTORS],
     /// Rotor places relative to the centre of mass.
     places: [(f64, f64); ROTORS],
+    lag: Option<Lag>,
     hover_speed: f64,
 }
 
 impl Rotors {
-    /// Rotors at rest. Their differences come from `noise`.
-    pub(crate) fn new(parameters: &PlantParameters, noise: &mut Noise) -> Self {
+    /// Rotors at rest. Their differences are the seed's.
+    pub(crate) fn new(parameters: &PlantParameters, conditions: &Conditions, seed: u64) -> Self {
+        let noise = &mut Noise::stream(seed, Stream::Airframe);
         let p = parameters;
         let spread = p.manufacturing_spread;
+        let limit = conditions.spread_limit;
         let per_volt = p.torque_coefficient / p.motor_voltage_a;
         let motor_constant = p.motor_constant();
-        // One propeller in three hundred is 6 % off; the centre of mass lies within a millimetre.
-        let thrust_coefficient = [(); ROTORS].map(|()| p.thrust_coefficient * (1.0 + 0.02 * spread * noise.normal()));
-        let centre = (0.0004 * spread * noise.normal(), 0.0004 * spread * noise.normal());
+        let thrust_coefficient = [(); ROTORS].map(|()| {
+            p.thrust_coefficient * (1.0 + conditions.rotor_spread * spread * noise.normal().clamp(-limit, limit))
+        });
+        let across = conditions.centre_spread * spread;
+        let centre = within(limit * across, [across * noise.normal(), across * noise.normal()]);
+        let motors = &mut Noise::stream(seed, Stream::RotorSpecimen);
+        let mut differing = |mean: f64| {
+            [(); ROTORS]
+                .map(|()| mean * (1.0 + conditions.rotor_curve_spread * spread * motors.normal().clamp(-limit, limit)))
+        };
+        let (resistance, constants) = (differing(p.motor_resistance), differing(motor_constant));
+        let askew = conditions.rotor_place_spread * spread;
+        let places = PLACES.map(|(x, y)| {
+            let [north, east] = within(limit * askew, [askew * motors.normal(), askew * motors.normal()]);
+            (x * p.rotor_offset - centre[0] + north, y * p.rotor_offset - centre[1] + east)
+        });
         Self {
             duty: [0.0; ROTORS],
             speed: [0.0; ROTORS],
             thrust_coefficient,
             torque_coefficient: p.torque_coefficient,
-            resistance: p.motor_resistance,
-            motor_constant,
+            resistance,
+            motor_constant: constants,
             viscous: ((p.motor_voltage_b - motor_constant) * per_volt).max(0.0),
             friction: p.motor_voltage_c * per_volt,
             inertia: p.rotor_inertia,
             faults: [RotorFault::NONE; ROTORS],
-            places: PLACES.map(|(x, y)| (x * p.rotor_offset - centre.0, y * p.rotor_offset - centre.1)),
+            places,
+            lag: Lag::new(conditions.collective_lag, DT),
             hover_speed: (p.mass * f64::from(GRAVITY) / (ROTORS as f64 * p.thrust_coefficient)).sqrt(),
         }
     }
@@ -138,11 +157,12 @@ impl Rotors {
         // Each line for all rotors, so that they are computed side by side.
         let duty: [f64; ROTORS] = core::array::from_fn(|i| self.faults[i].duty.unwrap_or(self.duty[i]));
         let speed = self.speed;
-        let current: [f64; ROTORS] =
-            core::array::from_fn(|i| ((duty[i] * voltage - self.motor_constant * speed[i]) / self.resistance).max(0.0));
+        let current: [f64; ROTORS] = core::array::from_fn(|i| {
+            ((duty[i] * voltage - self.motor_constant[i] * speed[i]) / self.resistance[i]).max(0.0)
+        });
         let drag = speed.map(|speed| self.torque_coefficient * speed * speed);
         self.speed = core::array::from_fn(|i| {
-            let net = self.motor_constant * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
+            let net = self.motor_constant[i] * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
             (speed[i] + net / self.inertia * dt).max(0.0)
         });
         let reaction: [f64; ROTORS] = core::array::from_fn(|i| {
@@ -151,6 +171,10 @@ impl Rotors {
         });
         let thrust: [f64; ROTORS] =
             core::array::from_fn(|i| self.thrust_coefficient[i] * self.faults[i].thrust * speed[i] * speed[i] * lift);
+        let thrust = match &mut self.lag {
+            Some(lag) => lag.pass(thrust),
+            None => thrust,
+        };
         let mut loads = RotorLoads::default();
         for i in 0..ROTORS {
             let (x, y) = self.places[i];
@@ -163,15 +187,20 @@ impl Rotors {
     }
 }
 
+/// A point in the plane, brought back onto a circle around the origin if it is outside.
+fn within(radius: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+    let far = (x * x + y * y).sqrt();
+    if far > radius { [x, y].map(|part| part * (radius / far)) } else { [x, y] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::Noise;
 
     const IDEAL: PlantParameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
 
     fn ideal() -> Rotors {
-        Rotors::new(&IDEAL, &mut Noise::new(0, 0))
+        Rotors::new(&IDEAL, &Conditions::GENTLE, 0)
     }
 
     #[test]
@@ -189,6 +218,57 @@ mod tests {
         assert!((loads.thrust / all.thrust - 0.875).abs() < 1e-3 && loads.torque.x.abs() > 1e-4, "{loads:?}");
         let (speed, _) = settled(RotorFault { duty: Some(1.0), ..RotorFault::NONE }, 0.0);
         assert!(speed[1] > healthy[1] && speed[0] < 1.0, "{speed:?}");
+    }
+
+    #[test]
+    fn specimens_lie_apart_as_their_conditions_say_and_no_farther() {
+        let conditions =
+            Conditions { rotor_spread: 0.05, centre_spread: 0.0012, spread_limit: 2.5, ..Conditions::GENTLE };
+        let (mut square, mut farthest, mut most) = (0.0, 0.0f64, 0.0f64);
+        let count = 2_000;
+        for seed in 0..count {
+            let rotors = Rotors::new(&PlantParameters::EXAMPLE, &conditions, seed);
+            let [x, y] = [0, 1].map(|axis| -rotors.places.iter().map(|p| [p.0, p.1][axis]).sum::<f64>() / 4.0);
+            farthest = farthest.max((x * x + y * y).sqrt());
+            for coefficient in rotors.thrust_coefficient {
+                let share = coefficient / PlantParameters::EXAMPLE.thrust_coefficient - 1.0;
+                most = most.max(share.abs());
+                square += share * share / (4 * count) as f64;
+            }
+        }
+        assert!((square.sqrt() / 0.05 - 1.0).abs() < 0.06, "{}", square.sqrt());
+        assert!((0.12..=0.125 + 1e-12).contains(&most), "{most}");
+        assert!((0.0029..=0.003 + 1e-12).contains(&farthest), "{farthest} m");
+    }
+
+    #[test]
+    fn motors_turn_differently_fast_on_the_same_voltage() {
+        let conditions = Conditions { rotor_curve_spread: 0.05, rotor_place_spread: 0.0005, ..Conditions::GENTLE };
+        let (mut square, mut aside, count) = (0.0, 0.0, 200);
+        for seed in 0..count {
+            let mut rotors = Rotors::new(&PlantParameters { manufacturing_spread: 1.0, ..IDEAL }, &conditions, seed);
+            rotors.set_duty([0.6; 4]);
+            settle(&mut rotors, 4.0);
+            let mean = rotors.speed().iter().sum::<f64>() / 4.0;
+            square += rotors.speed().map(|speed| (speed / mean - 1.0).powi(2)).iter().sum::<f64>() / (4 * count) as f64;
+            let across = rotors.places[0].1 - rotors.places[1].1;
+            aside += across * across / count as f64;
+        }
+        // Both act against each other: a strong magnet needs less current and makes more voltage.
+        assert!((0.01..0.04).contains(&square.sqrt()), "{}", square.sqrt());
+        assert!((aside.sqrt() / (0.0005 * 2f64.sqrt()) - 1.0).abs() < 0.15, "{} m", aside.sqrt());
+    }
+
+    #[test]
+    fn the_collective_lags_and_the_lift_comes_all_the_same() {
+        let mut rotors = Rotors::new(&IDEAL, &Conditions { collective_lag: 0.09, ..Conditions::GENTLE }, 0);
+        rotors.set_duty([0.62; 4]);
+        let before = settle(&mut rotors, 4.15).thrust;
+        rotors.set_duty([0.64; 4]);
+        let trace: Vec<_> = (0..1600).map(|_| rotors.step(DT, 4.15, 1.0).thrust - before).collect();
+        let goal = trace[1599] * (1.0 - (-1f64).exp());
+        let lag = trace.iter().filter(|gain| **gain < goal).count() as f64 * DT;
+        assert!((0.1..0.125).contains(&lag), "the rotors' 20 ms and 90: {lag} s");
     }
 
     /// The steady voltage at a speed.

@@ -6,6 +6,7 @@
 use super::battery::BatterySpec;
 use super::table::parameters;
 use crate::conditions::Conditions;
+use crate::noise::{Noise, Stream};
 
 parameters! {
     /// Airframe, motors, propellers, battery, ground and air of a quadrotor in X.
@@ -61,11 +62,23 @@ parameters! {
 }
 
 impl PlantParameters {
-    /// The same under these conditions: what they do to its battery.
+    /// The specimen of this seed under these conditions, as far as numbers of this table say it.
     #[must_use]
-    pub fn under(&self, conditions: &Conditions, _seed: u64) -> Self {
+    pub fn under(&self, conditions: &Conditions, seed: u64) -> Self {
         let battery = self.battery().worn(conditions.battery_age).at(conditions.battery_temperature);
+        let mut noise = Noise::stream(seed, Stream::Frame);
+        let mut share = |bound: f64| 1.0 + noise.within(bound);
+        let (mass, thrust) = (share(conditions.mass_spread), share(conditions.thrust_spread));
+        let [x, y] = [(); 2].map(|()| share(conditions.inertia_spread));
+        let lag = share(conditions.rotor_lag_spread);
         Self {
+            mass: self.mass * mass,
+            inertia_x: self.inertia_x * x,
+            inertia_y: self.inertia_y * y,
+            // What is farther from x or from y is farther from z: it goes with them, as in every flat body.
+            inertia_z: self.inertia_z * (0.5 * (x + y)),
+            thrust_coefficient: self.thrust_coefficient * thrust,
+            rotor_inertia: self.rotor_inertia * lag,
             battery_charge: battery.charge * (1.0 - conditions.battery_drained),
             battery_capacity: battery.capacity,
             battery_resistance: battery.resistance,

@@ -1,6 +1,7 @@
 //! The inertial sensor, a BMI270 as the StampFly uses it: ±8 g, ±2000 °/s, 1600 Hz into a FIFO that is read in
 //! fours and decimated to 400 Hz.
 
+use super::mounting::Mounting;
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
 use crate::normals::Normals;
@@ -56,6 +57,8 @@ pub(crate) struct ImuPhysics {
     /// Misalignment and scale.
     accel_matrix: Matrix3<f64>,
     gyro_matrix: Matrix3<f64>,
+    /// `None` where it should be.
+    mounting: Option<Mounting>,
     /// Of accelerometer and gyro, per kelvin; `None` of a sensor that has none.
     drift: Option<(Vector3<f64>, Vector3<f64>)>,
 }
@@ -67,7 +70,11 @@ impl ImuPhysics {
         let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
         // Half a degree between the axes, half a per cent of scale.
         let mut matrix = || Matrix3::identity() + Matrix3::from_fn(|_, _| noise.within(0.005));
-        let (accel_matrix, gyro_matrix) = (matrix(), matrix());
+        let (mut accel_matrix, mut gyro_matrix) = (matrix(), matrix());
+        let mounting = Mounting::of(world, seed);
+        if let Some(mounting) = &mounting {
+            (accel_matrix, gyro_matrix) = (accel_matrix * mounting.accel, gyro_matrix * mounting.gyro);
+        }
         let hover_speed = world.inspect(|body| body.nominal_rotor_speed());
         let strength = world.imperfections();
         let drift = (strength > 0.0).then(|| {
@@ -77,6 +84,7 @@ impl ImuPhysics {
         });
         let physics = Self {
             drift,
+            mounting,
             vibration: Vibration::new(
                 vibration,
                 schedule.period() * 1e-6,
@@ -94,6 +102,7 @@ impl ImuPhysics {
         };
         world.note_specimen(|specimen| {
             specimen.accel_matrix = physics.accel_matrix;
+            specimen.lever = mounting.map_or_else(Vector3::zeros, |mounting| mounting.lever);
             (specimen.accel_bias, specimen.gyro_bias) = (physics.accel_bias, physics.gyro_bias);
             (specimen.accel_drift, specimen.gyro_drift) = drift.unwrap_or_default();
         });
@@ -104,7 +113,8 @@ impl ImuPhysics {
     pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
-        let mut accel = self.accel_matrix * motion.specific_force + self.accel_bias;
+        let force = self.mounting.map_or(motion.specific_force, |mounting| mounting.felt(&motion));
+        let mut accel = self.accel_matrix * force + self.accel_bias;
         let mut gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
         if let Some((of_accel, of_gyro)) = &self.drift {
             let warmer = f64::from(self.temperature(at)) - REFERENCE;

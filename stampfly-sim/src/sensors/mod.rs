@@ -28,6 +28,7 @@ pub(crate) mod flow;
 mod gnss;
 pub mod imu;
 pub(crate) mod mag;
+pub(crate) mod mounting;
 mod mpu6000;
 pub(crate) mod power;
 pub(crate) mod schedule;

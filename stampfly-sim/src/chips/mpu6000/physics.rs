@@ -1,6 +1,7 @@
 //! What an MPU-6000 feels, 8000 times a second, before and after its low-pass (MPU-6000 product specification 3.4, "PS"; register map 4.2, "RM").
 
 use crate::noise::Noise;
+use crate::sensors::mounting::Mounting;
 use crate::sensors::schedule::Schedule;
 use crate::time::Clock;
 use crate::vibration::Vibration;
@@ -34,6 +35,8 @@ const BANDWIDTH: [[f64; 2]; 7] =
 #[derive(Debug)]
 pub(crate) struct Physics {
     world: World,
+    /// `None` where it should be.
+    mounting: Option<Mounting>,
     noise: Noise,
     vibration: Vibration,
     start: Instant,
@@ -53,6 +56,7 @@ impl Physics {
         let hover_speed = world.inspect(|body| body.nominal_rotor_speed());
         let shaking = Noise::new(seed, VIBRATION_STREAM);
         let physics = Self {
+            mounting: Mounting::of(world, seed),
             world: world.clone(),
             vibration: Vibration::new(vibration, schedule.period() * 1e-6, hover_speed, shaking),
             start,
@@ -70,9 +74,13 @@ impl Physics {
     pub fn tick(&mut self, tick: u64, filter: u8, at: Instant) {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
+        let (force, rate) = match &self.mounting {
+            Some(mounting) => (mounting.accel * mounting.felt(&motion), mounting.gyro * motion.rate),
+            None => (motion.specific_force, motion.rate),
+        };
         let felt = [
-            motion.specific_force.component_mul(&self.accel_scale) + self.accel_offset,
-            motion.rate.component_mul(&self.gyro_scale) + self.gyro_offset,
+            force.component_mul(&self.accel_scale) + self.accel_offset,
+            rate.component_mul(&self.gyro_scale) + self.gyro_offset,
         ];
         let bandwidths = BANDWIDTH[usize::from(filter).min(BANDWIDTH.len() - 1)];
         for (sensor, (felt, bandwidth)) in felt.iter().zip(bandwidths).enumerate() {
