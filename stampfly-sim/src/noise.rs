@@ -31,6 +31,8 @@ pub(crate) enum Stream {
     Conditions = 16,
     Frame = 17,
     ImuMounting = 18,
+    FlowSpecimen = 19,
+    FlowMotion = 20,
     RotorSpecimen = 25,
 }
 

@@ -38,6 +38,15 @@ impl Conditions {
             imu_misalignment: 0.035,
             imu_scale: 0.01,
             imu_lever: 0.006,
+            // The carried recordings fit scales from 0.79 to 1.11, and axes of 0.943 and 1.015.
+            flow_scale: 0.12,
+            flow_axis_scale: 0.05,
+            flow_mounting: 0.035,
+            // From a good floor to a bad one; a picture is compared in the time of about the next one.
+            flow_motion_noise: draw.between(0.03, 0.2),
+            flow_delay: draw.between(0.004, 0.012),
+            // PMW3901MB, data sheet.
+            flow_largest_rate: 7.4,
             ..Self::GENTLE
         };
         let worn = conditions.clone();

@@ -44,6 +44,13 @@ parameters! {
         imu_misalignment = 0.0 ["rad"] in 0.0 ..= 0.1, "Bound of the angle about each axis by which the inertial sensor is soldered askew.";
         imu_scale = 0.0 ["1"] in 0.0 ..= 0.05, "Bound of the share by which each axis of the inertial sensor measures too much, beyond half a per cent.";
         imu_lever = 0.0 ["m"] in 0.0 ..= 0.05, "Bound of the distance of the inertial sensor from the centre of mass, along each axis.";
+
+        flow_scale = 0.0 ["1"] in 0.0 ..= 0.3, "Bound of the share by which the flow sensor of one vehicle counts more than that of another.";
+        flow_axis_scale = 0.03 ["1"] in 0.0 ..= 0.2, "Bound of the share by which each axis of a flow sensor counts more than that.";
+        flow_mounting = 0.017453292519943295 ["rad"] in 0.0 ..= 0.2, "Bound of the angle by which the flow sensor is turned about the vertical.";
+        flow_motion_noise = 0.0 ["1"] in 0.0 ..= 0.5, "Standard deviation of the flow of one picture, as a share of that flow.";
+        flow_delay = 0.0 ["s"] in 0.0 ..= 0.05, "Age of the newest picture that a read has counted, beyond half a picture.";
+        flow_largest_rate = 1000.0 ["rad/s"] in 0.5 ..= 1000.0, "Largest flow that the sensor follows.";
     }
 }
 

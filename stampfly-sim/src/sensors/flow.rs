@@ -2,6 +2,7 @@
 //! 100 Hz, so a read holds the motion of one picture or of two.
 
 use super::schedule::Schedule;
+use super::swept::MotionError;
 use crate::noise::{Noise, Stream};
 use crate::plant::Motion;
 use crate::time::Clock;
@@ -39,6 +40,9 @@ pub(crate) struct FlowPhysics {
     counts: [f64; 2],
     /// Scale and mounting error of this specimen: rows x and y.
     mounting: [[f64; 2]; 2],
+    motion: MotionError,
+    /// From the last picture that is counted to the read, beyond half a picture.
+    delay: Duration,
     texture: f64,
 }
 
@@ -58,8 +62,11 @@ impl FlowPhysics {
     /// The physics and the instants at which the processor reads.
     pub(crate) fn new(world: &World, start: Instant, seed: u64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Flow);
-        let (scale_x, scale_y) = (1.0 + noise.within(0.03), 1.0 + noise.within(0.03));
-        let (sin, cos) = libm::sincos(noise.within(1f64.to_radians()));
+        let conditions = world.conditions();
+        let common = 1.0 + Noise::stream(seed, Stream::FlowSpecimen).within(conditions.flow_scale);
+        let mut scale = || common * (1.0 + noise.within(conditions.flow_axis_scale));
+        let (scale_x, scale_y) = (scale(), scale());
+        let (sin, cos) = libm::sincos(noise.within(conditions.flow_mounting));
         let frames = Schedule::new(start, FRAME_RATE, 0.02, &mut noise);
         let reads = Schedule::new(start, READ_RATE, 0.0, &mut noise);
         let physics = Self {
@@ -67,6 +74,8 @@ impl FlowPhysics {
             frame: 0,
             counts: [0.0; 2],
             mounting: [[scale_x * cos, scale_x * sin], [-scale_y * sin, scale_y * cos]],
+            motion: MotionError::new(&conditions, seed),
+            delay: Duration::from_micros((1e6 * conditions.flow_delay) as u64),
             texture: 140.0 + noise.within(40.0),
             noise,
             world: world.clone(),
@@ -77,7 +86,7 @@ impl FlowPhysics {
     /// Takes the pictures up to `at` and gives the whole counts since the last call, in the convention of
     /// [`FlowData`].
     pub(crate) fn read(&mut self, at: Instant) -> [f64; 2] {
-        while self.frames.instant(self.frame) <= at {
+        while self.frames.instant(self.frame) + self.delay <= at {
             self.expose(self.frame);
             self.frame += 1;
         }
@@ -102,6 +111,7 @@ impl FlowPhysics {
         // Simpson's rule over the picture.
         let swept: [f64; 2] =
             core::array::from_fn(|axis| (rates[0][axis] + 4.0 * rates[1][axis] + rates[2][axis]) / 6.0 * period * 1e-6);
+        let swept = self.motion.of(swept, period * 1e-6);
         let seen = f64::from(u8::from(height < FAR));
         for (row, counts) in self.mounting.iter().zip(&mut self.counts) {
             let angle = row[0] * swept[0] + row[1] * swept[1];

@@ -33,6 +33,7 @@ mod mpu6000;
 pub(crate) mod power;
 pub(crate) mod schedule;
 mod servos;
+mod swept;
 pub mod tof;
 
 pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};
