@@ -33,6 +33,8 @@ pub(crate) enum Stream {
     ImuMounting = 18,
     FlowSpecimen = 19,
     FlowMotion = 20,
+    BottomTofSpecimen = 21,
+    FrontTofSpecimen = 22,
     RotorSpecimen = 25,
 }
 

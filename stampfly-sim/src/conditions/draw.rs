@@ -38,6 +38,17 @@ impl Conditions {
             imu_misalignment: 0.035,
             imu_scale: 0.01,
             imu_lever: 0.006,
+            // The data sheets' ranging error, ±20 to 25 mm: 10 mm of it everywhere, the rest with the distance.
+            range_offset: 0.01,
+            range_scale: 0.05,
+            // The title of the VL53L3CX's data sheet, and its cone of 25°.
+            range_reach: 3.0,
+            range_cone: 0.218,
+            range_cover: draw.cover(),
+            // The grey and the white chart of the data sheet: a dark carpet to a white sheet of paper.
+            floor_reflectance: draw.between(0.17, 0.88),
+            // An evening with the curtains drawn, an office (5), a sunny day behind a window (50): data sheet of the VL53L1X, § 3.1.
+            ambient_light: draw.evenly_over_magnitudes(0.5, 50.0),
             // The carried recordings fit scales from 0.79 to 1.11, and axes of 0.943 and 1.015.
             flow_scale: 0.12,
             flow_axis_scale: 0.05,
@@ -63,6 +74,17 @@ struct Draw(Noise);
 impl Draw {
     fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.unit()
+    }
+
+    fn evenly_over_magnitudes(&mut self, low: f64, high: f64) -> f64 {
+        low * libm::exp(self.0.unit() * libm::log(high / low))
+    }
+
+    /// Half of all range finders are clean, and the StampFly's have no window. 0.2·10⁶/s are a good window (10³/s at each of 200 detectors), 5·10⁶/s a
+    /// thumb's print on it.
+    fn cover(&mut self) -> f64 {
+        let smeared = self.evenly_over_magnitudes(0.2, 5.0);
+        if self.0.chance(0.5) { smeared } else { 0.0 }
     }
 
     /// New to worn out, from a cold hall to a hot afternoon, full to half empty: flights begin with what the last one has left. With the

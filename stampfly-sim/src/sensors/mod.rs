@@ -27,6 +27,7 @@ mod cameras;
 pub(crate) mod flow;
 mod gnss;
 pub mod imu;
+pub(crate) mod light;
 pub(crate) mod mag;
 pub(crate) mod mounting;
 mod mpu6000;

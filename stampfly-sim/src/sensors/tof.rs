@@ -1,7 +1,9 @@
 //! The range finders, VL53L3CX: one measurement every 33 ms along a fixed beam.
 
+use super::light::{Echo, Echoes, Light, MAXIMUM};
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
+use crate::plant::Motion;
 use crate::time::Clock;
 use crate::world::World;
 use core::convert::Infallible;
@@ -15,8 +17,6 @@ pub(crate) const RATE: f64 = 30.0;
 const READ_OUT: Duration = Duration::from_micros(3_200);
 /// Shortest range that can be told from the cover glass, m.
 const MINIMUM: f64 = 0.020;
-/// Longest range with enough light coming back, m.
-const MAXIMUM: f64 = 4.0;
 /// Share of measurements lost for no reason that can be seen.
 const DROPOUTS: f64 = 0.003;
 
@@ -43,49 +43,80 @@ pub enum Mount {
 pub(crate) struct RangePhysics {
     world: World,
     noise: Noise,
-    beam: Vector3<f64>,
-    /// Offset of this specimen, m.
+    light: Light,
+    /// Of this specimen: how long a metre is, and offset, m.
+    scale: f64,
     offset: f64,
 }
 
 impl RangePhysics {
     /// The physics and the times of its measurements.
     pub(crate) fn new(world: &World, start: Instant, seed: u64, mount: Mount) -> (Self, Schedule) {
-        let (stream, beam) = match mount {
-            Mount::Bottom => (Stream::BottomTof, Vector3::z()),
-            Mount::Front => (Stream::FrontTof, Vector3::x()),
+        let (stream, specimen, axis) = match mount {
+            Mount::Bottom => (Stream::BottomTof, Stream::BottomTofSpecimen, Vector3::z()),
+            Mount::Front => (Stream::FrontTof, Stream::FrontTofSpecimen, Vector3::x()),
         };
+        let conditions = world.conditions();
         let mut noise = Noise::stream(seed, stream);
         let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
-        (Self { offset: noise.within(0.003), noise, beam, world: world.clone() }, schedule)
+        let physics = Self {
+            offset: noise.within(conditions.range_offset),
+            scale: 1.0 + Noise::stream(seed, specimen).within(conditions.range_scale),
+            light: Light::new(&conditions, axis),
+            noise,
+            world: world.clone(),
+        };
+        (physics, schedule)
     }
 
-    fn true_distance(&self, instant: Instant) -> Option<f64> {
-        let motion = self.world.motion_at(instant);
-        let beam = motion.attitude * self.beam;
+    /// The distance along a direction, body; `None` when it misses the floor.
+    fn distance(&self, motion: &Motion, direction: &Vector3<f64>) -> Option<f64> {
+        let beam = motion.attitude * direction;
         (beam.z > 1e-3).then(|| self.world.inspect(|plant| plant.scene().distance(&motion.position, &beam)))
     }
 
-    /// What this specimen's light travels to the floor, m; `None` when the beam misses it.
-    pub(crate) fn optical_distance(&self, instant: Instant) -> Option<f64> {
-        self.true_distance(instant).map(|distance| distance + self.offset)
+    fn true_distance(&self, instant: Instant) -> Option<f64> {
+        self.distance(&self.world.motion_at(instant), &self.light.axis())
+    }
+
+    fn echoes(&self, instant: Instant) -> Echoes {
+        let motion = self.world.motion_at(instant);
+        self.light.echoes(|direction| self.distance(&motion, direction))
+    }
+
+    /// What this specimen's light travels, and how much of it comes back.
+    pub(crate) fn optical_echoes(&self, instant: Instant) -> Echoes {
+        self.echoes(instant).map(|echo| Echo { distance: echo.distance * self.scale + self.offset, ..echo })
+    }
+
+    /// What comes back when something covers the window at this distance, m.
+    pub(crate) fn covered(&self, metres: f64) -> Echoes {
+        self.light.echoes(|_| Some(metres))
+    }
+
+    /// Ambient light, 10⁶ photons a second on all detectors.
+    pub(crate) fn ambient(&self) -> f64 {
+        self.light.ambient
     }
 
     /// A measurement around `instant`.
     pub(crate) fn measure(&mut self, instant: Instant) -> TofData {
-        let distance = self.true_distance(instant);
+        let distance = self.light.reported(&self.echoes(instant));
+        let ceiling = self.light.ceiling;
         // The same number of draws whatever happens, so that one flight's noise does not depend on its course.
         let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
         let invalid = |status| TofData { distance: 0.0, sigma: 0.0, status, valid: false };
-        let Some(distance) = distance.filter(|d| *d <= MAXIMUM * 1.2) else { return invalid(STATUS_SIGNAL) };
-        let sigma = 0.0008 + 0.0008 * distance + 0.0004 * distance * distance;
+        let Some(distance) = distance.filter(|d| *d <= ceiling * 1.2) else { return invalid(STATUS_SIGNAL) };
+        // As little light comes back as from where it would be in a dark room over a bright floor.
+        let dim = distance * (MAXIMUM / ceiling);
+        let sigma = 0.0008 + 0.0008 * dim + 0.0004 * dim * dim;
         // Whole millimetres, as the chip counts them.
-        let reading = ((distance + self.offset + sigma * normal) * 1000.0).round().max(0.0) / 1000.0;
+        let reading = ((distance * self.scale + self.offset + sigma * normal) * 1000.0).round().max(0.0) / 1000.0;
         let status = if lost {
             STATUS_SIGMA
         } else if distance < MINIMUM {
             STATUS_OUT_OF_BOUNDS
-        } else if distance > MAXIMUM {
+        } else if distance > ceiling {
             STATUS_SIGNAL
         } else {
             STATUS_VALID

@@ -59,7 +59,7 @@
 //! 0, as is the next; they go from 255 to 128. Even ones have the laser period and time-out A, odd ones B. It takes six time-outs and 1.7 ms,
 //! as that driver reckons. What is counted is in `photons.rs`.
 //!
-//! Not modelled: several targets, thresholds, groups of bins for bright light, other calibration data, the region of interest.
+//! Not modelled: which of several targets, thresholds, groups of bins for bright light, other calibration data, the region of interest.
 
 mod photons;
 
@@ -317,15 +317,16 @@ impl State {
         let Some((count, [group, _])) = self.histograms else { return };
         let (number, part) = Self::histogram_number(count);
         let [timeout, period] = TIMES[part];
-        let mut distance = self.physics.optical_distance(begin + self.duration() / 2);
+        let mut echoes = self.physics.optical_echoes(begin + self.duration() / 2);
         match self.flaw {
-            Some(Flaw::Offset(metres)) => distance = distance.map(|distance| distance + metres),
-            Some(Flaw::Covered(metres)) => distance = Some(metres),
+            Some(Flaw::Offset(metres)) => echoes.iter_mut().for_each(|echo| echo.distance += metres),
+            Some(Flaw::Covered(metres)) => echoes = self.physics.covered(metres),
             _ => {}
         }
         let from = GROUPS_OF_BINS[part];
         let shot = Shot {
-            distance,
+            echoes,
+            ambient: self.physics.ambient(),
             short: f64::from(self.short) * 1e-3,
             bin: self.pace / (CLOCKS * FAST),
             period: 2 * (usize::from(self.byte(period)) + 1),

@@ -7,21 +7,16 @@
 //! What ST's algorithms take for granted is so here: bins of a PLL period, the phase of no distance as found by the part's own reference
 //! pulse, ambient bins that count as long as the others, distances that come out long by 2048 to 1987, and a factory's offset before that
 //! (VL53LX bare driver: `VL53LX_range_maths`, `VL53LX_hist_calc_zero_distance_phase`). *Unverified*: strength and shape of the pulse, jitter,
-//! ambient light, the places of reference pulses. Not modelled: cross-talk of a cover glass, several targets, detectors that are still blind
-//! from the photon before.
+//! ambient light, the places of reference pulses. How much light comes back from where is in `sensors/light.rs`. Not modelled: detectors that are
+//! still blind from the photon before.
 
 use crate::noise::Noise;
+use crate::sensors::light::{Echo, Echoes};
 
 /// Bins of a histogram.
 pub(super) const BINS: usize = 24;
 /// Detectors that there are, less those behind smaller openings.
 const DETECTORS: f64 = 200.0;
-/// A floor at one metre, 10⁶ photons a second on all detectors: 40 % of the light it gets is scattered.
-const FLOOR: f64 = 8.0;
-/// Ambient light of a room, likewise.
-const AMBIENT: f64 = 0.5;
-/// The nearest a floor can be for the square of its distance to count, m.
-const NEAR: f64 = 0.05;
 /// Blur of the pulse, standard deviation in bins: 0.3 ns.
 const JITTER: f64 = 0.23;
 /// Speed of light in air, m/µs.
@@ -36,8 +31,10 @@ const MANY: f64 = 50.0;
 /// How a histogram is measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shot {
-    /// Way to the target, m; `None` without one.
-    pub distance: Option<f64>,
+    /// What comes back.
+    pub echoes: Echoes,
+    /// Ambient light, 10⁶ photons a second on all detectors.
+    pub ambient: f64,
     /// What the factory found to be missing, m.
     pub short: f64,
     /// A bin, µs.
@@ -84,23 +81,31 @@ impl Photons {
 
     /// The bins, and how many detectors were in use.
     pub(super) fn count(&mut self, shot: &Shot) -> ([u32; BINS], f64) {
-        let strength = shot.distance.map_or(0.0, |metres| FLOOR / metres.max(NEAR).powi(2));
-        let share = (shot.wanted / (strength + AMBIENT)).min(1.0);
+        let strength: f64 = shot.echoes.iter().map(Echo::rate).sum();
+        let share = (shot.wanted / (strength + shot.ambient)).min(1.0);
         let exposure = shot.macro_periods * COUNTED_PERIODS * shot.bin * share;
-        let travelled = (shot.distance.unwrap_or(0.0) * STRETCH - shot.short) / (0.5 * LIGHT * shot.bin);
-        let (middle, period) = (self.zero + travelled, shot.period as f64);
+        let period = shot.period as f64;
+        let middle = |distance: f64| self.zero + (distance * STRETCH - shot.short) / (0.5 * LIGHT * shot.bin);
+        let arriving: Vec<_> = shot
+            .echoes
+            .iter()
+            .filter(|echo| echo.brightness > 0.0)
+            .map(|echo| (middle(echo.distance), echo.rate()))
+            .collect();
         let mut bins = [0; BINS];
         for (place, bin) in bins.iter_mut().enumerate() {
             let group = shot.groups[place / 4];
-            let ambient = AMBIENT * exposure;
+            let ambient = shot.ambient * exposure;
             let mean = if group & 7 == 7 {
                 ambient
             } else {
                 let from = f64::from(group) * 4.0 + (place % 4) as f64;
-                let rounds = (-1..=8).map(|round| from + f64::from(round) * period - middle);
-                let arriving: f64 =
-                    rounds.map(|from| fraction(from + 1.0, shot.width) - fraction(from, shot.width)).sum();
-                ambient + strength * exposure * shot.width * arriving
+                arriving.iter().fold(ambient, |mean, (middle, rate)| {
+                    let rounds = (-1..=8).map(|round| from + f64::from(round) * period - middle);
+                    let arrived: f64 =
+                        rounds.map(|from| fraction(from + 1.0, shot.width) - fraction(from, shot.width)).sum();
+                    mean + rate * exposure * shot.width * arrived
+                })
             };
             *bin = self.poisson(mean);
         }
@@ -135,8 +140,14 @@ fn fraction(by: f64, width: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn at(distance: Option<f64>) -> Echoes {
+        let echo = distance.map(|distance| Echo { distance, brightness: 8.0 });
+        [echo.unwrap_or(Echo::NONE), Echo::NONE, Echo::NONE]
+    }
+
     const SHOT: Shot = Shot {
-        distance: Some(1.0),
+        echoes: [Echo { distance: 1.0, brightness: 8.0 }, Echo::NONE, Echo::NONE],
+        ambient: 0.5,
         short: 0.0,
         bin: 1.0 / (64.0 * 11.8),
         period: 24,
@@ -157,7 +168,7 @@ mod tests {
     fn light_weakens_with_the_square_of_the_distance_and_scatters_as_its_square_root() {
         let mut photons = Photons::new(Noise::new(1, 0));
         let mut sums = |distance| -> Vec<f64> {
-            let shot = Shot { distance, ..SHOT };
+            let shot = Shot { echoes: at(distance), ..SHOT };
             (0..2_000).map(|_| photons.count(&shot).0.iter().map(|bin| f64::from(*bin)).sum()).collect()
         };
         let mean = |sums: &[f64]| sums.iter().sum::<f64>() / sums.len() as f64;
@@ -173,7 +184,7 @@ mod tests {
     #[test]
     fn what_is_near_is_seen_by_fewer_detectors() {
         let mut photons = Photons::new(Noise::new(1, 0));
-        let near = photons.count(&Shot { distance: Some(0.1), ..SHOT }).1;
+        let near = photons.count(&Shot { echoes: at(Some(0.1)), ..SHOT }).1;
         let far = photons.count(&SHOT).1;
         assert!((near - 200.0 * 40.0 / 800.5).abs() < 0.01 && far == 200.0, "{near} {far}");
     }
