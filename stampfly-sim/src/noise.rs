@@ -35,6 +35,8 @@ pub(crate) enum Stream {
     FlowMotion = 20,
     BottomTofSpecimen = 21,
     FrontTofSpecimen = 22,
+    PressureWander = 23,
+    Doors = 24,
     RotorSpecimen = 25,
 }
 

@@ -9,5 +9,6 @@ mod estimate;
 mod flight_log;
 mod foreign_log;
 mod hostile_recordings;
+mod pressure;
 mod receiver;
 mod recorded;

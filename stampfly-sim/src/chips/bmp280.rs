@@ -135,7 +135,7 @@ impl Bmp280 {
         let mut noise = Noise::stream(seed, Stream::Baro);
         let now = clock.now();
         let pace = Schedule::new(now, RATE, 0.02, &mut noise).period() * RATE * 1e-6;
-        let physics = BaroPhysics::new(world, now, noise);
+        let physics = BaroPhysics::new(world, now, noise, seed);
         let mut chip = Self {
             physics,
             pace,

@@ -49,6 +49,13 @@ impl Conditions {
             floor_reflectance: draw.between(0.17, 0.88),
             // An evening with the curtains drawn, an office (5), a sunny day behind a window (50): data sheet of the VL53L1X, § 3.1.
             ambient_light: draw.evenly_over_magnitudes(0.5, 50.0),
+            baro_wander: 1.0,
+            // One flight record has +2.5 Pa, the sign on another specimen is unknown: up to 0.3 m either way in a hover, 0.6 m with the floor.
+            baro_wash: draw.between(-1.4, 1.4),
+            baro_wash_floor: draw.between(0.0, 1.0),
+            // Somebody comes or goes once in a minute. A door of a closed room makes 5 to 20 Pa.
+            baro_doors: 1.0 / 60.0,
+            baro_door: 18.0,
             // The carried recordings fit scales from 0.79 to 1.11, and axes of 0.943 and 1.015.
             flow_scale: 0.12,
             flow_axis_scale: 0.05,

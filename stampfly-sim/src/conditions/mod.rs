@@ -53,6 +53,12 @@ parameters! {
         floor_reflectance = 0.4 ["1"] in 0.02 ..= 1.0, "Share of the range finder's light that the floor scatters.";
         ambient_light = 0.0 ["1e3/s"] in 0.0 ..= 300.0, "Infrared light at each detector of the range finder, beyond a dim room's.";
 
+        baro_wander = 0.0 ["1"] in 0.0 ..= 5.0, "Wander of the pressure within seconds, in units of what is recorded.";
+        baro_wash = 1.0 ["1"] in -5.0 ..= 5.0, "Pressure of the propellers at the barometer, in units of what the vehicle says; negative where they suck.";
+        baro_wash_floor = 2.0 ["1"] in 0.0 ..= 5.0, "How much more of that there is with the vehicle at the floor, as a share.";
+        baro_doors = 0.0 ["1/s"] in 0.0 ..= 1.0, "How often a door is opened or shut.";
+        baro_door = 18.0 ["Pa"] in 0.0 ..= 100.0, "Largest step of the pressure when a door is opened or shut.";
+
         flow_scale = 0.0 ["1"] in 0.0 ..= 0.3, "Bound of the share by which the flow sensor of one vehicle counts more than that of another.";
         flow_axis_scale = 0.03 ["1"] in 0.0 ..= 0.2, "Bound of the share by which each axis of a flow sensor counts more than that.";
         flow_mounting = 0.017453292519943295 ["rad"] in 0.0 ..= 0.2, "Bound of the angle by which the flow sensor is turned about the vertical.";

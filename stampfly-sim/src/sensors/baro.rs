@@ -1,6 +1,7 @@
 //! The barometer, BMP280: new conversions at some 13 Hz, a slow drift, and the propellers' own pressure.
 
 use super::schedule::Schedule;
+use super::weather::{Doors, Wander};
 use crate::noise::{Noise, Stream};
 use crate::time::Clock;
 use crate::world::World;
@@ -20,8 +21,6 @@ pub(crate) const DEVIATION: f64 = 0.7;
 const RESOLUTION: f64 = 0.16;
 /// Drift by weather and warming, Pa/√s.
 const DRIFT: f64 = 0.12;
-/// How much more of the pressure in the propellers' wash there is near the floor.
-const WASH_FLOOR: f64 = 2.0;
 /// Height over which the floor's share fades, m.
 const WASH_HEIGHT: f64 = 0.2;
 
@@ -37,12 +36,26 @@ pub(crate) struct BaroPhysics {
     noise: Noise,
     drift: f64,
     start: Instant,
+    /// Of the propellers' pressure: in units of what the vehicle says, and how much more there is at the floor.
+    wash: [f64; 2],
+    /// `None` in a room where nothing moves but the vehicle.
+    wander: Option<Wander>,
+    doors: Option<Doors>,
 }
 
 impl BaroPhysics {
-    pub(crate) fn new(world: &World, start: Instant, mut noise: Noise) -> Self {
-        // Specimens differ by a metre or ten.
-        Self { drift: 60.0 * noise.normal(), noise, start, world: world.clone() }
+    pub(crate) fn new(world: &World, start: Instant, mut noise: Noise, seed: u64) -> Self {
+        let conditions = world.conditions();
+        Self {
+            // Specimens differ by a metre or ten.
+            drift: 60.0 * noise.normal(),
+            noise,
+            start,
+            wash: [conditions.baro_wash, conditions.baro_wash_floor],
+            wander: Wander::new(&conditions, seed),
+            doors: Doors::new(&conditions, start, seed),
+            world: world.clone(),
+        }
     }
 
     /// One conversion at `at`, Pa, `period` seconds after the one before, with noise of this standard deviation.
@@ -53,9 +66,15 @@ impl BaroPhysics {
         // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
         let still = FLOOR_PRESSURE - 11.77 * height;
         let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
-        let wash = wash * thrust * (1.0 + WASH_FLOOR * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        let [strength, at_floor] = self.wash;
+        let wash = wash * strength * thrust * (1.0 + at_floor * libm::exp(-height.max(0.0) / WASH_HEIGHT));
         self.drift += DRIFT * period.sqrt() * self.noise.normal();
-        still + wash + self.drift + deviation * self.noise.normal()
+        let (deviation, wander) = match &mut self.wander {
+            Some(wander) => (Wander::white(deviation), wander.after(period)),
+            None => (deviation, 0.0),
+        };
+        let quiet = still + wash + self.drift + deviation * self.noise.normal();
+        quiet + wander + self.doors.as_mut().map_or(0.0, |doors| doors.at(at))
     }
 
     /// Temperature of the die, °C.
@@ -78,7 +97,7 @@ impl BaroModel {
         let mut noise = Noise::stream(seed, Stream::Baro);
         Self {
             schedule: Schedule::new(clock.now(), RATE, 0.02, &mut noise),
-            physics: BaroPhysics::new(world, clock.now(), noise),
+            physics: BaroPhysics::new(world, clock.now(), noise, seed),
             clock: clock.clone(),
         }
     }

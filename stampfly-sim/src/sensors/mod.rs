@@ -36,6 +36,7 @@ pub(crate) mod schedule;
 mod servos;
 mod swept;
 pub mod tof;
+mod weather;
 
 pub use actuators::{ButtonModel, IndicatorRecorder, MotorModel};
 pub use airspeed::AirspeedModel;
