@@ -38,6 +38,8 @@ pub(crate) enum Stream {
     PressureWander = 23,
     Doors = 24,
     RotorSpecimen = 25,
+    VortexRing = 26,
+    Room = 27,
 }
 
 /// A seeded stream of random numbers.

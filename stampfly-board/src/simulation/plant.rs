@@ -14,6 +14,8 @@ pub const PLANT: PlantParameters = PlantParameters {
     inertia_z: INERTIA[2],
     gravity: 9.80665,
     rotor_offset: ROTOR_OFFSET,
+    // The propeller's, as it is sold.
+    rotor_radius: 0.01499,
     thrust_coefficient: THRUST_COEFFICIENT,
     torque_coefficient: TORQUE_COEFFICIENT,
     motor_voltage_a: MOTOR_VOLTAGE[0],

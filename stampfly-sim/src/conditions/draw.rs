@@ -38,6 +38,11 @@ impl Conditions {
             imu_misalignment: 0.035,
             imu_scale: 0.01,
             imu_lever: 0.006,
+            ceiling: draw.between(2.3, 3.2),
+            ceiling_effect: 1.0,
+            wall_effect: 1.0,
+            vortex_ring: 1.0,
+            room_side: draw.between(2.5, 6.0),
             // The data sheets' ranging error, ±20 to 25 mm: 10 mm of it everywhere, the rest with the distance.
             range_offset: 0.01,
             range_scale: 0.05,

@@ -45,6 +45,12 @@ parameters! {
         imu_scale = 0.0 ["1"] in 0.0 ..= 0.05, "Bound of the share by which each axis of the inertial sensor measures too much, beyond half a per cent.";
         imu_lever = 0.0 ["m"] in 0.0 ..= 0.05, "Bound of the distance of the inertial sensor from the centre of mass, along each axis.";
 
+        ceiling = 0.0 ["m"] in 0.0 ..= 100.0, "Height of the ceiling; 0 is none.";
+        ceiling_effect = 0.0 ["1"] in 0.0 ..= 2.0, "How much a ceiling draws the rotors, in units of theory.";
+        wall_effect = 0.0 ["1"] in 0.0 ..= 5.0, "How much a wall draws the rotors, in units of theory.";
+        vortex_ring = 0.0 ["1"] in 0.0 ..= 2.0, "What rotors lose in their own wake when they sink, in units of what is measured.";
+        room_side = 0.0 ["m"] in 0.0 ..= 100.0, "Side of the room whose walls send the wake back; 0 is none.";
+
         range_offset = 0.003 ["m"] in 0.0 ..= 0.05, "Bound of the offset of a range finder.";
         range_scale = 0.0 ["1"] in 0.0 ..= 0.1, "Bound of the share by which a range finder measures too long.";
         range_reach = 100.0 ["m"] in 0.5 ..= 100.0, "Longest range over a white floor (88 %) in the dark; above 4 m it is 4 m.";

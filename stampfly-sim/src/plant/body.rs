@@ -171,7 +171,7 @@ impl Body for Plant {
     }
 
     fn air(&self, height: f64) -> Vector3<f64> {
-        self.wind().velocity(height)
+        Self::air(self, height)
     }
 
     fn battery(&self) -> &Battery {

@@ -83,7 +83,7 @@ impl Ground {
         scene: &Scene,
     ) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
-        if !scene.is_empty() {
+        if scene.may_strike(position, self.reach) {
             let mut strikes = false;
             for point in &self.points {
                 let place = position + attitude * point;
@@ -98,7 +98,7 @@ impl Ground {
             }
             self.strikes += u64::from(strikes);
         }
-        if scene.is_level() && -position.z > self.reach {
+        if scene.slope == [0.0; 2] && -position.z - scene.highest() > self.reach {
             self.anchors = [None; POINTS];
             return (force, torque);
         }

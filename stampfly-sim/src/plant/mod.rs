@@ -15,6 +15,7 @@
 //! Use [`Plant`] alone to study the vehicle; use [`Simulation`](crate::Simulation) to fly it.
 
 mod aeroplane;
+mod air;
 mod battery;
 mod body;
 mod check;
@@ -27,6 +28,8 @@ mod scene;
 pub(crate) mod table;
 mod wear;
 mod wind;
+
+use air::{Air, Push};
 
 pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};
 pub use battery::{Battery, BatterySpec};
@@ -94,6 +97,8 @@ pub struct Plant {
     battery: Battery,
     ground: Ground,
     wind: Wind,
+    /// What there is of it in these conditions.
+    air: Option<Air>,
     scene: Scene,
 }
 
@@ -135,8 +140,9 @@ impl Plant {
             battery: Battery::new(&p.battery(), p.board_current),
             ground: Ground::new(p),
             wind: Wind::new(wind, DT, Noise::stream(seed, Stream::Wind)),
+            air: Air::new(p, conditions, seed),
             parameters: p.clone(),
-            scene: Scene::default(),
+            scene: Scene { ceiling: (conditions.ceiling > 0.0).then_some(conditions.ceiling), ..Scene::default() },
         }
     }
 
@@ -155,15 +161,22 @@ impl Plant {
         let p = &self.parameters;
         let m = &self.motion;
         self.wind.step();
-        let lift = self.ground.lift(self.scene.floor(&m.position) - m.position.z);
+        let mut lift = self.ground.lift(self.scene.floor(&m.position) - m.position.z);
+        if let Some(air) = &self.air {
+            lift *= air.lift(m, &self.scene);
+        }
         let loads = self.rotors.step(DT, self.battery.voltage(), lift);
         let current = loads.current + p.board_current;
         self.battery.step(DT, current);
 
         // Air: rotors lose thrust and drag along with their speed, the body drags by itself.
-        let air = m.attitude.inverse_transform_vector(&(m.velocity - self.wind.velocity(-m.position.z)));
         let speed = m.rotor_speed;
         let share = (speed[0] + speed[1] + speed[2] + speed[3]) / (ROTORS as f64 * self.rotors.hover_speed());
+        let mut wind = self.wind.velocity(-m.position.z);
+        if let Some(air) = &mut self.air {
+            wind += air.wind(share);
+        }
+        let air = m.attitude.inverse_transform_vector(&(m.velocity - wind));
         let linear = Vector3::new(p.drag_horizontal, p.drag_horizontal, p.drag_vertical) * share;
         let drag = -(air.component_mul(&linear) + air * (p.drag_quadratic * air.norm()));
 
@@ -174,8 +187,13 @@ impl Plant {
             floor_force += force;
             floor_torque += torque;
         }
-        let body_force =
+        let mut body_force =
             drag + Vector3::new(0.0, 0.0, -loads.thrust) + m.attitude.inverse_transform_vector(&floor_force);
+        if let Some(Push { force, torque }) = self.air.as_mut().map(|effects| effects.push(m, &self.scene, &air, share))
+        {
+            body_force += force;
+            floor_torque += torque;
+        }
         let specific_force = body_force / p.mass;
 
         // Rolling moves the rotors up and down through the air, which damps like climbing does.
@@ -231,7 +249,14 @@ impl Plant {
         &mut self.scene
     }
 
-    /// The air.
+    /// Velocity of the air at this height above the ground, with what comes back from the walls of a small room, world NED, m/s.
+    #[must_use]
+    pub fn air(&self, height: f64) -> Vector3<f64> {
+        let wind = self.wind.velocity(height);
+        self.air.as_ref().map_or(wind, |air| wind + air.returning())
+    }
+
+    /// The air, as the weather moves it.
     #[must_use]
     pub fn wind(&self) -> &Wind {
         &self.wind

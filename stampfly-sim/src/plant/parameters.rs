@@ -30,6 +30,7 @@ parameters! {
         inertia_z = 4.0e-5 ["kg*m^2"] in 1e-6 ..= 0.1, "Moment of inertia about body z.";
         gravity = 9.80665 ["m/s^2"] in 0.0 ..= 20.0, "Gravity (ISO 80000-3).";
         rotor_offset = 0.03 ["m"] in 0.005 ..= 0.5, "Distance of each rotor from the body's x and y axis.";
+        rotor_radius = 0.02 ["m"] in 0.005 ..= 0.3, "Radius of a propeller.";
         thrust_coefficient = 1.5e-8 ["N*s^2/rad^2"] in 1e-9 ..= 1e-4, "Thrust over rotor speed squared.";
         torque_coefficient = 7.5e-11 ["N*m*s^2/rad^2"] in 1e-13 ..= 1e-6, "Rotor drag torque over rotor speed squared.";
         motor_voltage_a = 7.0e-8 ["V*s^2/rad^2"] in 1e-9 ..= 1e-4, "Steady motor voltage: coefficient of speed squared.";

@@ -29,7 +29,7 @@ impl Beyond {
     }
 
     /// How far a place is inside, m; negative outside.
-    fn depth(&self, place: &Vector3<f64>) -> f64 {
+    pub(super) fn depth(&self, place: &Vector3<f64>) -> f64 {
         (place.x - self.point[0]) * self.ahead[0] + (place.y - self.point[1]) * self.ahead[1]
     }
 }
@@ -158,14 +158,19 @@ impl Scene {
         [ceiling, wall, face].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
     }
 
-    /// Is the floor where it is by default?
-    pub(super) fn is_level(&self) -> bool {
-        self.edge.is_none() && self.slope == [0.0; 2]
+    /// Height of the highest floor where nothing slopes, m.
+    pub(super) fn highest(&self) -> f64 {
+        self.edge.map_or(0.0, |(_, drop)| (-drop).max(0.0))
     }
 
-    /// Is there nothing that can push, beside the floor?
-    pub(super) fn is_empty(&self) -> bool {
-        self.ceiling.is_none() && self.wall.is_none()
+    /// Can something beside the floor push a vehicle here, none of whose points is farther from its place than `reach`?
+    pub(super) fn may_strike(&self, place: &Vector3<f64>, reach: f64) -> bool {
+        let (ceiling, wall) = (self.ceiling, self.wall);
+        let under = ceiling.is_some_and(|height| -place.z + reach > height);
+        let beside = wall.is_some_and(|wall| wall.depth(place) + reach > 0.0);
+        // The face of an edge pushes only where one of the other two is: flights that are on record depend on it.
+        let face = self.edge.is_some() && (ceiling.is_some() || wall.is_some());
+        under || beside || face
     }
 
     /// Force (world) and torque (body) of the hand.

@@ -15,6 +15,8 @@ pub const PLANT: PlantParameters = PlantParameters {
     inertia_z: 2.0e-3,
     gravity: 9.80665,
     rotor_offset: 0.078,
+    // 5 inches.
+    rotor_radius: 0.0635,
     // Thrust and power coefficients 0.10 and 0.041, air of 1.2 kg/m³: usual for a propeller of this pitch.
     thrust_coefficient: 7.9e-7,
     torque_coefficient: 6.6e-9,
