@@ -43,6 +43,10 @@ impl Conditions {
             wall_effect: 1.0,
             vortex_ring: 1.0,
             room_side: draw.between(2.5, 6.0),
+            // A rug, a doorstep, a bed; over a table's edge flies who wants to. A floor stands still.
+            floor_step: draw.step(),
+            floor_step_distance: draw.between(0.4, 2.0),
+            floor_step_bearing: draw.between(0.0, core::f64::consts::TAU),
             // The data sheets' ranging error, ±20 to 25 mm: 10 mm of it everywhere, the rest with the distance.
             range_offset: 0.01,
             range_scale: 0.05,
@@ -97,6 +101,17 @@ impl Draw {
     fn cover(&mut self) -> f64 {
         let smeared = self.evenly_over_magnitudes(0.2, 5.0);
         if self.0.chance(0.5) { smeared } else { 0.0 }
+    }
+
+    /// Half of all floors are level. What is on the others is 5 mm to 0.3 m high, and one in four of those steps leads down.
+    fn step(&mut self) -> f64 {
+        let high = self.evenly_over_magnitudes(0.005, 0.3);
+        let (level, down) = (self.0.chance(0.5), self.0.chance(0.25));
+        match (level, down) {
+            (true, _) => 0.0,
+            (false, true) => -high,
+            (false, false) => high,
+        }
     }
 
     /// New to worn out, from a cold hall to a hot afternoon, full to half empty: flights begin with what the last one has left. With the

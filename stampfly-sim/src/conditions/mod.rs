@@ -51,6 +51,12 @@ parameters! {
         vortex_ring = 0.0 ["1"] in 0.0 ..= 2.0, "What rotors lose in their own wake when they sink, in units of what is measured.";
         room_side = 0.0 ["m"] in 0.0 ..= 100.0, "Side of the room whose walls send the wake back; 0 is none.";
 
+        floor_step = 0.0 ["m"] in -3.0 ..= 0.5, "How much higher the floor is beyond a line, a table or a rug; negative where it is lower.";
+        floor_step_distance = 1.0 ["m"] in 0.2 ..= 100.0, "Distance of that line from the origin.";
+        floor_step_bearing = 0.0 ["rad"] in -6.3 ..= 6.3, "Where it is, from north to east.";
+        floor_north = 0.0 ["m/s"] in -3.0 ..= 3.0, "How fast the floor moves to the north: a ship's deck, a conveyor, a curtain's shadow.";
+        floor_east = 0.0 ["m/s"] in -3.0 ..= 3.0, "How fast it moves to the east.";
+
         range_offset = 0.003 ["m"] in 0.0 ..= 0.05, "Bound of the offset of a range finder.";
         range_scale = 0.0 ["1"] in 0.0 ..= 0.1, "Bound of the share by which a range finder measures too long.";
         range_reach = 100.0 ["m"] in 0.5 ..= 100.0, "Longest range over a white floor (88 %) in the dark; above 4 m it is 4 m.";

@@ -142,7 +142,7 @@ impl Plant {
             wind: Wind::new(wind, DT, Noise::stream(seed, Stream::Wind)),
             air: Air::new(p, conditions, seed),
             parameters: p.clone(),
-            scene: Scene { ceiling: (conditions.ceiling > 0.0).then_some(conditions.ceiling), ..Scene::default() },
+            scene: Scene::under(conditions),
         }
     }
 

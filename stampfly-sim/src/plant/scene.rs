@@ -5,6 +5,7 @@
 //! the vehicle, whose range finder looks down.
 
 use super::Motion;
+use crate::conditions::Conditions;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A vertical half space: everything beyond a line on the floor.
@@ -109,6 +110,20 @@ impl Scene {
         wall: None,
         hand: None,
     };
+
+    /// What stands around under these conditions.
+    #[must_use]
+    pub fn under(conditions: &Conditions) -> Self {
+        let Conditions { ceiling, floor_step: step, floor_step_distance: distance, .. } = *conditions;
+        let (east, north) = libm::sincos(conditions.floor_step_bearing);
+        let ahead = [north, east];
+        Self {
+            edge: (step != 0.0).then(|| (Beyond { point: ahead.map(|part| part * distance), ahead }, -step)),
+            floor_velocity: [conditions.floor_north, conditions.floor_east],
+            ceiling: (ceiling > 0.0).then_some(ceiling),
+            ..Self::LEVEL
+        }
+    }
 
     /// The floor's z at a place, world NED, m.
     #[must_use]
@@ -290,6 +305,32 @@ mod tests {
         let (place, far) = (Vector3::new(0.0, 0.0, -1.0), scene.distance(&Vector3::new(0.0, 0.0, -1.0), &beam));
         let met = place + beam * far;
         assert!((met.z - scene.floor(&met)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn conditions_have_steps_ceilings_and_floors_that_move() {
+        assert_eq!(Scene::under(&Conditions::GENTLE), Scene::LEVEL);
+        let east = core::f64::consts::FRAC_PI_2;
+        let conditions = Conditions {
+            ceiling: 2.4,
+            floor_step: 0.2,
+            floor_step_distance: 0.5,
+            floor_step_bearing: east,
+            floor_north: 0.1,
+            ..Conditions::GENTLE
+        };
+        let scene = Scene::under(&conditions);
+        let at = |north: f64, east: f64| scene.floor(&Vector3::new(north, east, -1.0));
+        assert_eq!([at(0.0, 0.4), at(2.0, 0.4), at(0.0, 0.6), at(-2.0, 0.6)], [0.0, 0.0, -0.2, -0.2]);
+        assert_eq!((scene.ceiling, scene.floor_velocity), (Some(2.4), [0.1, 0.0]));
+        // A vehicle that comes down on the step stands on it, and goes north with it.
+        let parameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+        let pose = Pose { rotors: 0.0, position: Vector3::new(0.0, 0.8, -0.3), ..Pose::hovering(0.3) };
+        let mut plant = Plant::under(&parameters, &conditions, &WindConfig::CALM, Some(&pose), 1);
+        (0..4800).for_each(|_| plant.step());
+        let motion = plant.motion();
+        assert!((motion.position.z + 0.2 + parameters.ground_height).abs() < 2e-3, "{motion:?}");
+        assert!((motion.velocity.x - 0.1).abs() < 0.01, "{motion:?}");
     }
 
     #[test]
