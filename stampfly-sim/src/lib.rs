@@ -10,6 +10,7 @@
 //! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
 //! * [`fault`]: what goes wrong in a flight, when, and for how long;
 //! * [`sight`]: a person who flies by sight, for vehicles that are flown by sticks alone;
+//! * [`sticks`]: files of what a person's thumbs did, or are to do;
 //! * [`watched`]: how a flight looks from beside the field, and which end it was;
 //! * [`ask`]: what a ground station asks of a vehicle that flies in real time;
 //! * [`ground`]: the services that every vehicle has at its ports, and [`station`], who flies missions from there (feature `ground`);
@@ -44,6 +45,7 @@ mod simulation;
 mod specimen;
 #[cfg(feature = "ground")]
 pub mod station;
+pub mod sticks;
 pub mod time;
 pub mod touchdown;
 pub mod vehicle;

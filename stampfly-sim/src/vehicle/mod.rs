@@ -40,6 +40,7 @@ use crate::SimulationConfig;
 use crate::ask;
 use crate::fault::{Fault, FaultKind};
 use crate::plant::Airframe;
+use crate::sticks::StickOptions;
 use crate::time::{Clock, Tasks};
 use core::fmt;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -261,6 +262,9 @@ pub struct Options {
     pub fault: Vec<String>,
     /// Fly with a pilot's sticks, in this flight mode; empty is the vehicle's own choice.
     pub pilot: Option<String>,
+    /// Fly what is in a stick file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sticks: Option<StickOptions>,
     /// Fly what other programs ask for; not written down, because it is not repeatable.
     #[serde(skip)]
     pub live: Option<Live>,

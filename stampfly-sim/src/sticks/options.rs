@@ -1,0 +1,210 @@
+//! How a stick file is to be flown: as it is typed, and resolved for a vehicle.
+
+use super::file::{Row, StickFile};
+use super::throttle::{self, Throttle};
+use crate::vehicle::SetupError;
+use serde::{Deserialize, Serialize};
+use stampfly_types::Duration;
+use stampfly_types::messages::{FlightMode, PilotInput};
+use std::path::Path;
+
+/// Height at which a recording begins that begins in flight, m: a person's hover in a room.
+pub const START_HEIGHT: f32 = 1.5;
+/// Lowest and highest height at which one may begin, m.
+const HEIGHTS: [f32; 2] = [0.3, 20.0];
+/// Farthest from the centre at which a vehicle may hover.
+const HOVER: f32 = 0.9;
+/// A throttle stick below this is at its lowest: a trim and some noise above it.
+const LOWEST: f32 = -0.9;
+/// A recording that begins on the ground has its throttle there for this long.
+const LOW_FOR: Duration = Duration::from_secs(1);
+/// The hover throttle of a file, measured in it.
+const MEDIAN: &str = "median";
+
+/// How a stick file is to be flown, as it is typed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StickOptions {
+    /// A file, or what is in one: a text of more than one line.
+    pub file: String,
+    /// The vehicle's flight mode in place of the file's.
+    pub mode: Option<String>,
+    /// Where a file that begins armed is to begin, m above the ground.
+    pub from_height: Option<f32>,
+    /// The throttle with which the file's vehicle hovered in manual modes: a number, or `median`.
+    pub hover_throttle: Option<String>,
+    /// The file's time begins when the vehicle may be armed, and not at power-on.
+    pub when_ready: bool,
+}
+
+/// When and where a file begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// With the vehicle's power: it begins disarmed.
+    PowerOn,
+    /// When the vehicle may be armed: it begins disarmed.
+    Ready,
+    /// On the ground, when the vehicle has been armed: it begins armed, with the throttle at its lowest.
+    Armed,
+    /// In the air, at this height above the ground, m: it begins armed, with the throttle raised.
+    Height(f32),
+}
+
+/// A stick file for one vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sticks {
+    /// What is played.
+    pub file: StickFile,
+    /// The mode that is flown in place of the file's.
+    pub mode: Option<FlightMode>,
+    /// When and where it begins.
+    pub start: Start,
+    /// What its throttle means.
+    pub throttle: Throttle,
+}
+
+impl StickOptions {
+    /// What is in the file.
+    ///
+    /// # Errors
+    /// When it is no stick file.
+    pub fn file(&self) -> Result<StickFile, SetupError> {
+        if self.file.contains('\n') {
+            return StickFile::parse(self.file.as_bytes()).map_err(|error| format!("--sticks: {error}"));
+        }
+        StickFile::read(Path::new(&self.file)).map_err(|error| format!("--sticks {}: {error}", self.file))
+    }
+
+    /// The same flight in options that do not depend on the file.
+    ///
+    /// # Errors
+    /// As [`file`](Self::file).
+    pub fn settled(&self) -> Result<Self, SetupError> {
+        let file = self.file()?;
+        let hover = self.hover(&file)?.map(|hover| hover.to_string());
+        Ok(Self { file: file.to_string(), hover_throttle: hover, ..self.clone() })
+    }
+
+    fn hover(&self, file: &StickFile) -> Result<Option<f32>, SetupError> {
+        match self.hover_throttle.as_deref() {
+            None => Ok(None),
+            Some(MEDIAN) => Ok(throttle::median(file)),
+            Some(text) => {
+                let hover = text.parse().ok().filter(|hover: &f32| hover.abs() <= HOVER);
+                let wrong = || format!("--hover-throttle '{text}' is neither '{MEDIAN}' nor from -{HOVER} to {HOVER}");
+                hover.ok_or_else(wrong).map(Some)
+            }
+        }
+    }
+}
+
+impl Sticks {
+    /// What these options mean to a vehicle whose throttle stick is this. `mode` is the mode that its options name.
+    ///
+    /// # Errors
+    /// When the file is none, or a number is out of its range.
+    pub fn new(options: &StickOptions, mode: Option<FlightMode>, throttle: Throttle) -> Result<Self, SetupError> {
+        let file = options.file()?;
+        let throttle = Throttle { of_file: options.hover(&file)?, ..throttle };
+        let [low, high] = HEIGHTS;
+        if let Some(height) = options.from_height.filter(|height| !(low..=high).contains(height)) {
+            return Err(format!("--from-height {height} is not from {low} to {high}"));
+        }
+        let start = match options.from_height {
+            _ if !file.first().input.arm => {
+                if options.when_ready {
+                    Start::Ready
+                } else {
+                    Start::PowerOn
+                }
+            }
+            Some(height) => Start::Height(height),
+            None if begins_low(&file) => Start::Armed,
+            None => Start::Height(START_HEIGHT),
+        };
+        Ok(Self { file, mode, start, throttle })
+    }
+
+    /// The mode in which a row is flown.
+    #[must_use]
+    pub fn flown(&self, row: FlightMode) -> FlightMode {
+        self.mode.unwrap_or(row)
+    }
+
+    /// Sticks of the file as this vehicle's transmitter sends them.
+    #[must_use]
+    pub fn sent(&self, input: &PilotInput) -> PilotInput {
+        let mode = self.flown(input.mode);
+        PilotInput { mode, throttle: self.throttle.sent(input.throttle, input.mode, mode), ..*input }
+    }
+
+    /// How long the file is.
+    #[must_use]
+    pub fn length(&self) -> Duration {
+        self.file.last().at
+    }
+}
+
+/// Is the throttle at its lowest from the first row on, for a second?
+fn begins_low(file: &StickFile) -> bool {
+    let begins = file.first().at;
+    let first = |row: &&Row| row.at.as_micros() < begins.as_micros() + LOW_FOR.as_micros();
+    file.rows().iter().take_while(first).all(|row| row.input.throttle < LOWEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THROTTLE: Throttle = Throttle { rest: 0.0, hover: 0.6, of_file: None };
+
+    fn options(rows: &str) -> StickOptions {
+        StickOptions { file: format!("t,throttle,roll,pitch,yaw,mode,arm\n{rows}\n"), ..StickOptions::default() }
+    }
+
+    #[test]
+    fn a_file_says_itself_where_it_begins() {
+        let start = |options: &StickOptions| Sticks::new(options, None, THROTTLE).expect("sticks").start;
+        let [ground, low, high] = [
+            "0,-1,0,0,0,acro,0\n9,-1,0,0,0,acro,1",
+            "0,-1,0,0,0,acro,1\n1,0.5,0,0,0,acro,1",
+            "0,-1,0,0,0,acro,1\n0.98,-0.4,0,0,0,acro,1",
+        ]
+        .map(options);
+        assert_eq!([&ground, &low, &high].map(start), [Start::PowerOn, Start::Armed, Start::Height(START_HEIGHT)]);
+        let at = |options: &StickOptions| {
+            start(&StickOptions { from_height: Some(4.0), when_ready: true, ..options.clone() })
+        };
+        assert_eq!([&ground, &low, &high].map(at), [Start::Ready, Start::Height(4.0), Start::Height(4.0)]);
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named() {
+        let refused = |options: StickOptions| Sticks::new(&options, None, THROTTLE).expect_err("a mistake");
+        let file = || options("0,0,0,0,0,acro,1");
+        assert_eq!(
+            refused(StickOptions { from_height: Some(f32::NAN), ..file() }),
+            "--from-height NaN is not from 0.3 to 20"
+        );
+        for hover in ["0.95", "NaN", "half"] {
+            let error = refused(StickOptions { hover_throttle: Some(hover.into()), ..file() });
+            assert_eq!(error, format!("--hover-throttle '{hover}' is neither 'median' nor from -0.9 to 0.9"));
+        }
+        assert_eq!(refused(options("0,0,0,0,0,acro,3")), "--sticks: line 2: arm: '3' is neither 0 nor 1");
+        assert!(refused(StickOptions { file: "none.csv".into(), ..file() }).starts_with("--sticks none.csv: "));
+    }
+
+    #[test]
+    fn settled_options_need_no_file_and_mean_the_same() {
+        let typed = StickOptions {
+            mode: Some("acro".into()),
+            hover_throttle: Some("median".into()),
+            ..options("0,-0.5,0,0,0,acro,1\n3,-0.25,0,0,0,acro,1\n4,0.5,0,0,0,acro,1")
+        };
+        let settled = typed.settled().expect("settled");
+        assert_eq!(settled.hover_throttle.as_deref(), Some("-0.5"));
+        let means = |options: &StickOptions| Sticks::new(options, Some(FlightMode::Acro), THROTTLE);
+        assert_eq!(means(&settled), means(&typed));
+        assert_eq!(settled.settled(), Ok(settled));
+    }
+}
