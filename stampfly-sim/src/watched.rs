@@ -92,6 +92,8 @@ pub struct Watched<M> {
     pub cut: bool,
     /// Other programs flew it.
     pub live: bool,
+    /// A stick file flew it: a person's sticks may fly a sound vehicle into the ground.
+    pub by_sticks: bool,
     /// Speed at the hardest touch after flight, m/s: a bounce does not make it a soft one.
     pub touchdown: f32,
     /// Largest tilt, rad.
@@ -261,9 +263,11 @@ impl<M: Measured> Watched<M> {
         }
     }
 
-    /// The worst end that is acceptable. Without faults the mission has to be flown to its end.
+    /// The worst end that is acceptable. Without faults the mission has to be flown to its end;
+    /// sticks may end anywhere.
     fn worst(&self) -> Class {
-        self.expected.unwrap_or(Class::Degraded)
+        let worst = self.expected.unwrap_or(Class::Degraded);
+        if self.by_sticks { worst.max(Class::Crashed) } else { worst }
     }
 }
 
@@ -273,7 +277,9 @@ impl<M: Measured> Verdict for Watched<M> {
             return true;
         }
         let flown = self.facts().iter().all(|(_, holds)| *holds);
-        self.class().is_within(self.worst()) && (flown || self.expected.is_some())
+        let is_within =
+            if self.by_sticks { self.class() <= self.worst() } else { self.class().is_within(self.worst()) };
+        is_within && (flown || self.expected.is_some())
     }
 
     fn findings(&self) -> impl Serialize {
@@ -290,7 +296,11 @@ impl<M: Measured> Verdict for Watched<M> {
 
     fn facts(&self) -> Vec<(&'static str, bool)> {
         let landed = self.finished && self.stands() && self.touchdown <= HARD;
-        vec![("landed", landed), ("disarmed", self.disarmed), ("finished", self.finished)]
+        let mut facts = vec![("landed", landed), ("disarmed", self.disarmed), ("finished", self.finished)];
+        if self.by_sticks {
+            facts.remove(0);
+        }
+        facts
     }
 
     fn figures(&self) -> Vec<Figure> {
@@ -312,6 +322,7 @@ impl<M: Measured> Verdict for Watched<M> {
             return "flown by other programs".into();
         }
         match (self.expected, self.succeeded()) {
+            (None, true) if self.by_sticks => format!("flown to the end of its sticks: {}", self.class()),
             (None, true) => "landed and disarmed".into(),
             (None, false) => format!("FAILED: {}", self.class()),
             (Some(_), true) => format!("{}, as expected", self.class()),

@@ -148,6 +148,28 @@ def flies(page: Page, picture) -> None:
     until("landed", lambda: text(page, "phase") == "on the ground" and text(page, "armed") == "disarmed")
 
 
+def plays_a_stick_file(page: Page, folder: Path) -> None:
+    page.click("#tab-fly")
+    until("it may be armed", lambda: page.is_visible("#ready"), 60)
+    file = folder / "sticks.csv"
+    file.write_text("t,throttle\n0,0\n")
+    page.set_input_files("#sticks-file", file)
+    until("no stick file is refused", lambda: "line 1: column roll is missing" in text(page, "messages"))
+    # A climb, and the vehicle is let go in the air.
+    rows = ("0,0,0,0,0,althold,0", "0.5,0,0,0,0,althold,1", "3.5,0.5,0,0,0,althold,1", "5,0,0,0,0,althold,1")
+    file.write_text("\n".join(("t,throttle,roll,pitch,yaw,mode,arm", *rows)) + "\n")
+    page.set_input_files("#sticks-file", file)
+    until("the file is open", lambda: "5.0 s" in text(page, "sticks-state"))
+    page.click("#sticks-play")
+    until("its sticks fly", lambda: text(page, "phase") == "flying" and figure(page, "height") > 0.5)
+    until("landed", lambda: text(page, "phase") == "on the ground" and text(page, "armed") == "disarmed")
+    page.click("#sticks-play")
+    until("in the air again", lambda: text(page, "phase") == "flying", 60)
+    page.click("#sticks-stop")
+    until("let go", lambda: "let go" in text(page, "sticks-state"))
+    until("landed again", lambda: text(page, "phase") == "on the ground" and text(page, "armed") == "disarmed")
+
+
 def injects_a_fault(page: Page, picture) -> None:
     page.click("#tab-faults")
     page.fill("#fault-search", "flow-lost" if page.locator("#faults li", has_text="flow-lost").count() else "flow")
@@ -408,6 +430,7 @@ def look(browser, address: str, options, folder: Path) -> None:
     picture("parameters")
     page.click("#tab-fly")
     flies(page, picture)
+    plays_a_stick_file(page, folder)
     injects_a_fault(page, picture)
     kills(page)
     opens_the_log(page, options.program[0], folder, picture)

@@ -20,6 +20,7 @@
 //! | [`radio_packets`] | the radio | accepted packets mean the same when sent again, the armed keep their transmitter |
 //! | [`receiver_bytes`] | a radio receiver or a configurator at a UART | frames mean the same when sent again, every byte is accounted for |
 //! | [`rover_datagrams`] | UDP and CSV files | what is accepted is accepted again, as bytes and as text |
+//! | [`stick_file`] | files of a pilot's sticks | numbers are in range, times ascend, what is written is read as it was |
 //! | [`tello_text`] | any program on the network | what is accepted is within limits, every answer is text that can be read |
 //! | [`services_cable`] | a person and programs on one serial line | a line that is typed comes whole, what is sent is sound, an armed vehicle changes nothing |
 //! | [`services_mavlink`] | ground stations, three at once, with a key and without | what is sent is sound, a command is acknowledged, strangers are not obeyed |
@@ -48,6 +49,7 @@ mod receivers;
 mod secured;
 mod services;
 mod stack;
+mod sticks;
 mod stream;
 mod tello;
 mod ulog_file;
@@ -67,6 +69,7 @@ pub use receivers::receiver_bytes;
 pub use secured::secure_session;
 pub use services::{services_cable, services_mavlink, services_msp, services_tello};
 pub use stack::whole_stack;
+pub use sticks::stick_file;
 pub use stream::data_stream;
 pub use tello::tello_text;
 pub use ulog_file::ulog;

@@ -7,7 +7,7 @@ use super::home::Home;
 use super::judge::{Judge, Sight};
 use super::live::{Seen, Services};
 use super::outcome::Outcome;
-use super::pilot::{Meaning, Pilot};
+use super::pilot::{Meaning, Pilot, approach};
 use super::radio::Radio;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
 use super::setup::Setup;
@@ -148,8 +148,9 @@ impl vehicle::Surroundings for Surroundings {
             }
         };
         let waits = wrong.injector.wants(Moment::Ground);
-        match (&setup.live, setup.pilot) {
-            (Some(live), _) => {
+        let meaning = Meaning::new(&setup.vehicle.navigator, &setup.vehicle.cascade);
+        match (&setup.live, &setup.sticks, setup.pilot) {
+            (Some(live), ..) => {
                 let shared = (&*seen, &*health, &*profile);
                 let services = Services::new(
                     live,
@@ -161,19 +162,21 @@ impl vehicle::Surroundings for Surroundings {
                 );
                 tasks.spawn(live.serve(clock.clone(), ground::PERIOD, services));
             }
-            (None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
-            (None, Some(mode)) => {
-                let meaning = Meaning::new(&setup.vehicle.navigator, &setup.vehicle.cascade);
+            (None, Some(sticks), _) => {
+                tasks.spawn(Pilot::new(radio, world, home, meaning, approach(sticks)).play(sticks, waits, progress));
+            }
+            (None, None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
+            (None, None, Some(mode)) => {
                 tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
             }
         }
-        let hover_without_link = setup.vehicle.mode.hover_without_link;
         // What people break on purpose is not judged.
         let judged = match setup.live {
             Some(_) => Injector::new(setup.simulation.start, &setup.faults),
             None => wrong.injector.clone(),
         };
-        let judge = Judge::new(&judged, &setup.mission, setup.pilot, hover_without_link);
+        let judge = Judge::new(&judged, &setup.mission, setup.pilot, &setup.vehicle);
+        let judge = setup.sticks.iter().fold(judge, Judge::of_sticks);
         Around {
             clock: clock.clone(),
             world: world.clone(),
@@ -181,6 +184,7 @@ impl vehicle::Surroundings for Surroundings {
             progress,
             watch: Watch::new(home),
             live: setup.live.as_ref(),
+            by_sticks: setup.sticks.is_some(),
             seen,
             sealed,
             air,
@@ -215,6 +219,8 @@ pub struct Around<'a> {
     watch: Watch,
     /// The programs that fly it, if there are.
     live: Option<&'a Live>,
+    /// A stick file flies it.
+    by_sticks: bool,
     seen: &'a Seen,
     /// The secure session, if there is one.
     sealed: Option<air::Shared<'a>>,
@@ -335,6 +341,7 @@ impl vehicle::Around for Around<'_> {
             tuned: watch.tuned,
             finished: self.progress.finished.get(),
             live: self.live.is_some(),
+            by_sticks: self.by_sticks,
             air: self.air.get(),
             record: self.sealed.map(|air| air.borrow_mut().record()).unwrap_or_default(),
             worst_tilt_deg: f64::from(watch.worst_tilt.to_degrees()),

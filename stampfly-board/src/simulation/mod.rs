@@ -52,6 +52,7 @@ use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::FaultKind;
+use stampfly_sim::sticks::{StickOptions, Sticks, Throttle, mode_named};
 use stampfly_sim::vehicle::{
     self, Ended, FlightOptions, Golden, Options, Page, PortSpec, Remote, RemoteError, Setting, SetupError, Variety,
     Vehicle, Witness,
@@ -92,6 +93,10 @@ impl Vehicle for StampFly {
             set_alone(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
         }
         setup.vehicle.check(None).map_err(|error| format!("--param {error}"))?;
+        if let Some(typed) = &options.sticks {
+            let sticks = sticks_of(typed, options, &setup)?;
+            setup = setup.playing(sticks);
+        }
         setup.faults = options.faults(faults::FAULTS)?;
         if let Some(name) = &options.pilot {
             let mode = pilot::mode_named(name);
@@ -105,6 +110,9 @@ impl Vehicle for StampFly {
     }
 
     fn settled(options: &Options, seed: u64) -> Result<Options, SetupError> {
+        if let Some(sticks) = &options.sticks {
+            return Ok(Options { sticks: Some(sticks.settled()?), ..options.clone() });
+        }
         // The semicolon at the end says that it is a mission's text, and not a file.
         let mission = format!("{};", mission_of(options, seed)?);
         Ok(Options { mission: Some(mission), ..options.clone() })
@@ -181,6 +189,9 @@ impl Vehicle for StampFly {
     }
 
     fn shorter_missions(options: &Options, seed: u64) -> Vec<String> {
+        if options.sticks.is_some() {
+            return Vec::new();
+        }
         let Ok(Mission { steps }) = mission_of(options, seed) else { return Vec::new() };
         let [arm, takeoff, middle @ .., land] = steps.as_slice() else { return Vec::new() };
         let shorter = |count| {
@@ -199,6 +210,23 @@ impl Vehicle for StampFly {
 fn set_alone(config: &mut VehicleConfig, name: &str, value: f32) -> Result<(), ParameterError> {
     let index = parameters::find(config, name)?;
     parameters::set_alone(config, index, value)
+}
+
+/// The stick file that is typed, for a vehicle that is set up like this.
+fn sticks_of(typed: &StickOptions, options: &Options, setup: &Setup) -> Result<Sticks, SetupError> {
+    if options.mission.is_some() || options.pilot.is_some() || options.live.is_some() {
+        return Err("--sticks says what is flown: there is neither a mission, nor a pilot, nor another program".into());
+    }
+    let mode = typed.mode.as_deref().map(|name| {
+        let unknown = || format!("--mode '{name}' is none of {}", pilot::MODES.join(", "));
+        mode_named(name).ok_or_else(unknown)
+    });
+    let VehicleConfig { authority, cascade, .. } = &setup.vehicle;
+    let altitude = &cascade.altitude;
+    // The dead band is no thrust, and what is beyond it is spread over the rest.
+    let rest = authority.dead_band;
+    let hover = rest + (1.0 - rest) * altitude.hover_thrust / altitude.thrust_max;
+    Sticks::new(typed, mode.transpose()?, Throttle { rest, hover, of_file: None })
 }
 
 /// The mission that options name: one that is built in, the text of one, or a file.

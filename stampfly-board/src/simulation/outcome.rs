@@ -1,7 +1,7 @@
 //! How a flight of the StampFly went, for people and for scripts.
 
 use super::air::AirReport;
-use super::judge::Judgement;
+use super::judge::{Intervention, Judgement};
 use super::metrics::{FIGURES, Metrics};
 use crate::VehicleConfig;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use stampfly_control::autotune::AutotuneStatus;
 use stampfly_sim::vehicle::{Figure, Verdict};
 use stampfly_types::Instant;
 use stampfly_types::messages::{FlightMode, FlightPhase};
-use std::string::String;
+use std::string::{String, ToString as _};
 use std::vec::Vec;
 use std::{format, vec};
 
@@ -47,6 +47,8 @@ pub struct Outcome {
     pub record: Vec<u8>,
     /// Other programs flew it: it had nothing to finish.
     pub live: bool,
+    /// A stick file flew it: it may end anywhere, and what the vehicle did by itself is judged.
+    pub by_sticks: bool,
     /// Somebody has asked for a restart, with these parameters if any were kept.
     pub restart: Option<Option<VehicleConfig>>,
 }
@@ -72,6 +74,15 @@ impl Verdict for Outcome {
         let motors_sane = ("motors_sane", !self.judgement.violations.iter().any(|name| ["I1", "I2"].contains(name)));
         if self.live {
             return vec![motors_sane];
+        }
+        if self.by_sticks {
+            let unhindered = !self.judgement.interventions.iter().any(|one| one.sound);
+            return vec![
+                ("disarmed", self.metrics.disarmed),
+                ("finished", self.finished),
+                ("unhindered", unhindered),
+                motors_sane,
+            ];
         }
         vec![
             ("landed", self.metrics.landed),
@@ -121,7 +132,12 @@ impl Verdict for Outcome {
             return format!("flown by other programs, ended as {}", phase.name());
         }
         let Judgement { outcome, reason, as_expected, violations, .. } = &self.judgement;
-        if self.succeeded() {
+        if self.by_sticks && self.succeeded() {
+            match reason.as_str() {
+                "" => outcome.to_string(),
+                reason => format!("{outcome}: {reason}"),
+            }
+        } else if self.succeeded() {
             "landed and disarmed".into()
         } else if !as_expected {
             format!("{}: {reason}", outcome.to_uppercase())
@@ -150,7 +166,13 @@ impl Outcome {
         phases.dedup_by(|(_, next), (_, last)| next == last);
         let armed = self.phases.iter().find(|change| change.phase == FlightPhase::Armed);
         let armed = armed.map_or(f64::INFINITY, |change| change.since.seconds_f64());
-        let Judgement { faults, alerts, .. } = &self.judgement;
+        let Judgement { faults, alerts, interventions, .. } = &self.judgement;
+        let interventions = interventions.iter().map(|one| {
+            let Intervention { alert, height_m, speed_mps, tilt_deg, .. } = one;
+            let sound = if one.sound { ", WHILE THE VEHICLE IS SOUND" } else { "" };
+            let place = format!("at {height_m:.1} m, {speed_mps:.1} m/s, tilted by {tilt_deg:.0} deg");
+            (one.t_s, format!("{alert} {} {place}{sound}", one.verb()))
+        });
         let faults = faults
             .iter()
             .filter_map(|span| Some((span.since?, format!("fault {}, {} changes", span.fault, span.changes))));
@@ -159,7 +181,7 @@ impl Outcome {
             (span.since, format!("alert {}{until}", span.name))
         });
         let tuned = self.tuned.iter().map(|(at, status)| (at.seconds_f64(), format!("autotune {status}")));
-        phases.extend(faults.chain(alerts).chain(tuned));
+        phases.extend(faults.chain(alerts).chain(interventions).chain(tuned));
         phases
     }
 }

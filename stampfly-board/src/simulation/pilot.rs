@@ -13,6 +13,12 @@
 //!
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
+//!
+//! `sticks` is the pilot who plays a stick file, however that ends.
+
+mod sticks;
+
+pub(super) use sticks::{approach, mission_around};
 
 use super::ground_station::Progress;
 use super::home::Home;
@@ -136,8 +142,16 @@ impl<'b> Pilot<'b> {
     /// Flies the mission. A place that cannot be reached is given up. With `waits`, two seconds pass between the
     /// display's permission and arming.
     pub async fn fly(mut self, mission: &Mission, waits: bool, progress: &Progress) {
+        self.steps(&mission.steps, waits, progress).await;
+        progress.finished.set(true);
+        loop {
+            self.frame(Aim::Stand).await;
+        }
+    }
+
+    async fn steps(&mut self, steps: &[Step], waits: bool, progress: &Progress) {
         let mut place = Vec3::zeros();
-        for step in &mission.steps {
+        for step in steps {
             match *step {
                 Step::Arm => {
                     while !self.may_arm() {
@@ -173,10 +187,6 @@ impl<'b> Pilot<'b> {
                 Step::Land => self.land(place).await,
             }
             progress.done.set(progress.done.get() + 1);
-        }
-        progress.finished.set(true);
-        loop {
-            self.frame(Aim::Stand).await;
         }
     }
 

@@ -11,6 +11,7 @@ use crate::vehicles::DEFAULT;
 use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
+use stampfly_sim::sticks::StickOptions;
 use stampfly_sim::vehicle::{Options, Variety, Vehicle, WorldKind};
 use stampfly_types::Duration;
 
@@ -193,7 +194,7 @@ impl Case {
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
         let Self { vehicle, seed, options, .. } = self;
-        let Options { mission, pilot, fault, gust, chips, jitter, vibration, .. } = options;
+        let Options { mission, pilot, sticks, fault, gust, chips, jitter, vibration, .. } = options;
         let mut arguments: Vec<String> = vec!["fly".into(), "--seed".into(), seed.to_string()];
         let mut add = |name: &str, value: Option<String>| {
             if let Some(value) = value {
@@ -208,6 +209,7 @@ impl Case {
         add("jitter", jitter.map(|jitter| jitter.to_string()));
         add("mode", pilot.clone().filter(|mode| !mode.is_empty()));
         arguments.extend(pilot.as_ref().map(|_| "--pilot".into()));
+        arguments.extend(sticks.iter().flat_map(of_sticks));
         arguments.extend(chips.then(|| "--chips".into()));
         arguments.extend(rest(options));
         arguments
@@ -218,6 +220,18 @@ impl Case {
     pub fn line(&self) -> String {
         format!("stampfly {}", shell_line(&self.arguments()))
     }
+}
+
+/// The arguments that play a stick file.
+fn of_sticks(sticks: &StickOptions) -> Vec<String> {
+    let StickOptions { file, mode, from_height, hover_throttle, when_ready } = sticks;
+    let mut words = vec!["--sticks".into(), file.clone()];
+    let height = from_height.map(|height| height.to_string());
+    for (name, value) in [("--mode", mode), ("--from-height", &height), ("--hover-throttle", hover_throttle)] {
+        words.extend(value.iter().flat_map(|value| [name.into(), value.clone()]));
+    }
+    words.extend(when_ready.then(|| "--when-ready".into()));
+    words
 }
 
 /// Words as a shell reads them.

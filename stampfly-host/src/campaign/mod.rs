@@ -9,6 +9,7 @@
 //! | [`shard`], [`mod@file`] | the part of a campaign that one task flies, and its Parquet file |
 //! | [`summary`], [`page`] | faults × moments, failures; as CSV and HTML |
 //! | [`shrink`] | the smallest flight in which the same goes wrong |
+//! | [`sticks`] | every stick file in every mode that makes sense |
 //! | [`parallel`] | work on every core |
 
 pub mod case;
@@ -19,6 +20,7 @@ pub mod parallel;
 pub mod row;
 pub mod shard;
 pub mod shrink;
+pub mod sticks;
 pub mod summary;
 
 use crate::flown::{Flown, fly};

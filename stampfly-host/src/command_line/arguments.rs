@@ -5,12 +5,14 @@ mod estimate;
 mod live;
 mod log;
 mod scene;
+mod sticks;
 
 pub use campaign::{CampaignOptions, Engine};
 pub use estimate::EstimateOptions;
 pub use live::{ConnectOptions, DemoOptions, HilOptions, ServeOptions, VehiclePlace};
 pub use log::{GoldenOptions, LogCommand, ReplayOptions};
 pub use scene::{FlyOptions, SceneOptions};
+pub use sticks::StickArguments;
 
 use crate::vehicles;
 use clap::{Args, Parser, Subcommand};

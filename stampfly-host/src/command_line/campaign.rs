@@ -7,6 +7,7 @@ use crate::command_line::arguments::CampaignOptions;
 use crate::command_line::failure::Failure;
 use crate::command_line::fault_campaign;
 use crate::command_line::fly::add_findings;
+use crate::command_line::stick_campaign;
 use crate::command_line::terminal;
 use crate::vehicles::{self, ForVehicle};
 use serde_json::{Map, Value, json};
@@ -37,6 +38,9 @@ impl ForVehicle for Campaign<'_> {
         if options.scene.list {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
+        }
+        if !options.sticks.is_empty() {
+            return stick_campaign::run::<V>(options);
         }
         if options.faults {
             return fault_campaign::run::<V>(options);

@@ -92,8 +92,8 @@ impl ForVehicle for Fly<'_> {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
         }
-        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, None)?;
-        let typed = options.scene.options(options.scene.jitter);
+        let typed = options.options();
+        let setup = V::setup(&typed, options.seed)?;
         let (flown, recorder) = fly_and_write::<V>(options, &typed, options.seed, &setup, here::<V>)?;
         if options.scene.json {
             outln!("{}", Value::Object(figures(&flown, recorder.hash())));
@@ -141,7 +141,7 @@ pub(crate) fn fly_and_write<V: Vehicle>(
     write_report::<V>(
         &flown,
         (recorder.log(), recorder.hash()),
-        flight.mission.as_deref(),
+        refly::flown(flight).as_deref(),
         seed,
         &options.out.join(PAGE),
     )?;
@@ -156,7 +156,7 @@ pub(crate) fn fly_and_write<V: Vehicle>(
 pub(crate) fn write_report<V: Vehicle>(
     flown: &Flown<V::Outcome>,
     (log, hash): (&[u8], u64),
-    mission: Option<&str>,
+    flown_what: Option<&str>,
     seed: u64,
     page: &Path,
 ) -> Result<(), Failure> {
@@ -167,10 +167,10 @@ pub(crate) fn write_report<V: Vehicle>(
     let figures = figures.iter().filter_map(|figure| Some((figure, figure.value?)));
     metrics.extend(figures.map(|(figure, value)| Metric::new(figure.title(), format!("{value:.3}"), figure.unit)));
     metrics.push(Metric::new("log hash", format!("{hash:016x}"), ""));
-    let mission = mission.map(|mission| format!("mission {mission}, ")).unwrap_or_default();
+    let what = flown_what.map(|what| format!("{what}, ")).unwrap_or_default();
     let report = Report {
         title: format!("Flight of {}", V::NAME),
-        subtitle: format!("simulated, {mission}seed {seed}, {:.1} s", flown.duration.seconds_f64()),
+        subtitle: format!("simulated, {what}seed {seed}, {:.1} s", flown.duration.seconds_f64()),
         metrics,
         page: &V::PAGE,
         flight: &parsed.flight,

@@ -41,8 +41,8 @@ impl ForVehicle for Hil<'_> {
 
     fn run<V: Vehicle>(self) -> Self::Output {
         let Self(HilOptions { fly: options, real_time, .. }, port) = self;
-        let setup = options.scene.setup::<V>(options.seed, options.scene.jitter, None)?;
-        let typed = options.scene.options(options.scene.jitter);
+        let typed = options.options();
+        let setup = V::setup(&typed, options.seed)?;
         let mut said = Figures::default();
         let (flown, recorder) =
             fly_and_write::<V>(options, &typed, options.seed, &setup, |setup, mut recorder, report| {

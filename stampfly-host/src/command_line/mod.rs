@@ -34,6 +34,7 @@ mod modes;
 mod replay;
 mod schedule;
 mod serve;
+mod stick_campaign;
 mod terminal;
 mod topics;
 

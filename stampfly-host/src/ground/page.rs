@@ -22,6 +22,7 @@ const SCRIPT: [&str; 2] = [
         include_str!("page/strips.js"),
         include_str!("page/status.js"),
         include_str!("page/controls.js"),
+        include_str!("page/stick_file.js"),
         include_str!("page/sticks.js"),
         include_str!("page/panels.js"),
         include_str!("page/calibration.js"),

@@ -1,11 +1,15 @@
 //! What is in a log.
 
+use super::refly::{OPTIONS, options_of};
 use serde::Serialize;
 use stampfly_lab::flight_log::{FlightLog, Omission};
 use stampfly_log::plain;
 use stampfly_types::Instant;
 use std::collections::BTreeMap;
 use std::fmt;
+
+/// Most characters of a fact on the screen.
+const SHOWN: usize = 400;
 
 /// What is in a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,8 +85,12 @@ impl Info {
             };
             (name.clone(), info)
         });
+        // Options that are too long for one fact are one here.
+        let (options, parts) = options_of(&flight.info);
+        let whole = |name: &String, value: &String| if name == OPTIONS { options.clone() } else { value.clone() };
+        let facts = flight.info.iter().filter(|(name, _)| *name == OPTIONS || !parts.contains(name));
         Self {
-            facts: flight.info.iter().map(|(name, value)| (name.clone(), value.clone())).collect(),
+            facts: facts.map(|(name, value)| (name.clone(), whole(name, value))).collect(),
             parameters: flight.parameters.len(),
             first_s: span.map_or(0.0, |(first, _)| seconds(first)),
             last_s: span.map_or(0.0, |(_, last)| seconds(last)),
@@ -103,7 +111,10 @@ pub(crate) fn omissions(log: &FlightLog) -> impl Iterator<Item = &Omission> {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (name, value) in &self.facts {
-            writeln!(f, "{:<24}{}", plain(name).to_string(), plain(value))?;
+            // A stick file may be in there.
+            let shown: String = value.chars().take(SHOWN).collect();
+            let rest = if shown.len() < value.len() { "…" } else { "" };
+            writeln!(f, "{:<24}{}{rest}", plain(name).to_string(), plain(&shown))?;
         }
         writeln!(f, "{:<24}{}", "parameters", self.parameters)?;
         writeln!(f, "{:<24}{:.3} s to {:.3} s", "samples", self.first_s, self.last_s)?;

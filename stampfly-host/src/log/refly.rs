@@ -16,12 +16,16 @@ use stampfly_sim::recorder::Recorder;
 use stampfly_sim::vehicle::change::{Change, ChangeError};
 use stampfly_sim::vehicle::{Motion, Observer, Options, Page, PanelSpec, SetupError, Vehicle, Verdict};
 use stampfly_types::Instant;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
 use std::path::Path;
 
-/// The fact of a log that has the options of its flight, as JSON.
+/// The fact of a log that has the options of its flight, as JSON. What is longer than a message of
+/// a log goes on in `flight_options/1` and so on.
 pub const OPTIONS: &str = "flight_options";
+/// Most bytes of the options in one fact: a message of a log has 2048, and the fact's key is in it.
+const PART: usize = 1_900;
 /// Where the course of before is in a report.
 const BEFORE: &str = "before";
 /// Where the way from it to the new course is.
@@ -33,13 +37,40 @@ const DIFFERENCE: &str = "difference";
 /// When there is no such flight.
 pub fn facts<V: Vehicle>(options: &Options, seed: u64) -> Result<Vec<(String, String)>, SetupError> {
     let settled = serde_json::to_string(&V::settled(options, seed)?).map_err(|error| error.to_string())?;
-    let facts = [
-        ("ver_sw", env!("CARGO_PKG_VERSION").to_owned()),
-        ("seed", seed.to_string()),
-        ("mission", options.mission.clone().unwrap_or_else(|| "default".into())),
-        (OPTIONS, settled),
-    ];
-    Ok(facts.map(|(name, value)| (name.to_owned(), value)).to_vec())
+    let mission = flown(options).unwrap_or_else(|| "default".into());
+    let facts = [("ver_sw", env!("CARGO_PKG_VERSION").to_owned()), ("seed", seed.to_string()), ("mission", mission)];
+    Ok(facts.map(|(name, value)| (name.to_owned(), value)).into_iter().chain(in_parts(&settled)).collect())
+}
+
+/// What is flown, for people: the mission, or the stick file, as it was typed.
+#[must_use]
+pub fn flown(options: &Options) -> Option<String> {
+    // Not what is in a file.
+    let clipped = |text: &str| text.lines().next().unwrap_or_default().chars().take(200).collect::<String>();
+    let sticks = options.sticks.as_ref().map(|sticks| format!("sticks {}", clipped(&sticks.file)));
+    sticks.or_else(|| options.mission.as_deref().map(clipped))
+}
+
+/// The options as facts.
+fn in_parts(options: &str) -> Vec<(String, String)> {
+    let (mut parts, mut rest) = (Vec::new(), options);
+    while parts.is_empty() || !rest.is_empty() {
+        let end = (0..=PART.min(rest.len())).rev().find(|end| rest.is_char_boundary(*end)).unwrap_or(rest.len());
+        let (part, behind) = rest.split_at(end);
+        parts.push((key_of_part(parts.len()), part.to_owned()));
+        rest = behind;
+    }
+    parts
+}
+
+/// The options among a log's facts, put together, and the names of the facts that have them.
+pub(crate) fn options_of(facts: &BTreeMap<String, String>) -> (String, Vec<String>) {
+    let keys: Vec<_> = (0..).map(key_of_part).take_while(|key| facts.contains_key(key)).collect();
+    (keys.iter().filter_map(|key| facts.get(key)).map(String::as_str).collect(), keys)
+}
+
+fn key_of_part(part: usize) -> String {
+    if part == 0 { OPTIONS.to_owned() } else { format!("{OPTIONS}/{part}") }
 }
 
 /// Why a flight was not flown again.
@@ -123,7 +154,8 @@ pub struct Reflown<O> {
 pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Result<Reflown<V::Outcome>, ReflyError> {
     let recorded = flight_log::parse(log).map_err(ReflyError::Log)?;
     let fact = |name: &str| recorded.flight.info.get(name);
-    let options: Options = fact(OPTIONS).and_then(|text| serde_json::from_str(text).ok()).ok_or(ReflyError::NoWorld)?;
+    let (text, keys) = options_of(&recorded.flight.info);
+    let options: Options = serde_json::from_str(&text).map_err(|_| ReflyError::NoWorld)?;
     let seed = fact("seed").and_then(|text| text.parse().ok()).ok_or(ReflyError::NoWorld)?;
     let setup = V::setup(&options, seed).map_err(ReflyError::Setup)?;
     let mut with_change = options.clone();
@@ -131,10 +163,8 @@ pub fn refly<V: Vehicle>(log: &[u8], from: Instant, parameters: &[String]) -> Re
     let changed = V::setup(&with_change, seed).map_err(ReflyError::Setup)?;
 
     // What the log says of itself, once more: the mission may have been named.
-    let facts: Vec<_> = ["ver_sw", "seed", "mission", OPTIONS]
-        .into_iter()
-        .filter_map(|name| Some((name.to_owned(), fact(name)?.clone())))
-        .collect();
+    let named = ["ver_sw", "seed", "mission"].map(String::from).into_iter().chain(keys);
+    let facts: Vec<_> = named.filter_map(|name| fact(&name).cloned().map(|value| (name, value))).collect();
     let mut before = Recorder::<V>::with_log(&setup, &facts);
     let flown_before = fly::<V>(&setup, &mut before, &mut |_, _| {});
     // As far as the log goes: it may have been cut off.

@@ -54,6 +54,8 @@ fn kinds() -> Vec<Kind> {
     );
     let px4 = (1..100).map(px4).collect::<String>();
     let mission = "arm\ntakeoff 0.4\nhover 2\ngoto 0.5 -0.3 0.6 yaw 60\nland\n".repeat(20);
+    let stick_row = |n: usize| format!("{:.2},0.6,0.{},-0.25,0,stabilize,1\n", n as f32 * 0.02, n % 10);
+    let sticks = format!("t,throttle,roll,pitch,yaw,mode,arm\n{}", (0..100).map(stick_row).collect::<String>());
     let kind = |name, bytes: &[u8], command| Kind { name, bytes: bytes.to_vec(), command };
     vec![
         kind("log", &second.log, "log info FILE"),
@@ -65,6 +67,7 @@ fn kinds() -> Vec<Kind> {
         kind("compact record, replayed", &second.record, "replay FILE"),
         // The mission comes before the fault, which there is not: nothing is flown.
         kind("mission", mission.as_bytes(), "fly --mission FILE --fault none@0"),
+        kind("sticks", sticks.as_bytes(), "fly --sticks FILE --fault none@0"),
         kind("drive of the rover", COURSE.as_bytes(), "fly --vehicle rover --mission FILE"),
         // No file has so many rows.
         kind("flights of a campaign", &flights(), "fly --from FILE --row 9999"),

@@ -51,6 +51,7 @@ mod safety_mode;
 mod safety_sensors;
 mod same_number;
 mod set_points;
+mod sticks;
 mod stm32_quad;
 #[cfg(unix)]
 mod stopped;

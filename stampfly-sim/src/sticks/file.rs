@@ -55,7 +55,8 @@ pub struct Row {
     pub land: bool,
 }
 
-/// A stick file: rows in order of time, at least one. Rows that repeat the one above are left out, but for the last.
+/// A stick file: rows in order of time, at least one. Rows that repeat the one above are left out,
+/// but for the last.
 ///
 /// ```
 /// use stampfly_sim::sticks::{StickErrorKind, StickFile};
@@ -202,16 +203,17 @@ impl<'a> Iterator for Lines<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         while !self.rest.is_empty() {
             self.number += 1;
-            if self.taken > MOST_BYTES {
-                return Some(Err(StickErrorKind::TooLarge.at(self.number)));
-            }
-            // No farther than a line may reach: one of a megabyte is refused without looking at all of it.
+            // No farther than a line may reach: one of a megabyte is refused without looking at all
+            // of it.
             let head = self.rest.get(..=LONGEST_LINE).unwrap_or(self.rest);
             let end = head.iter().position(|byte| *byte == b'\n');
             if end.is_none() && head.len() > LONGEST_LINE {
                 return Some(Err(StickErrorKind::LineTooLong.at(self.number)));
             }
             let (line, rest) = self.rest.split_at(end.unwrap_or(head.len()));
+            if self.taken + line.len() > MOST_BYTES {
+                return Some(Err(StickErrorKind::TooLarge.at(self.number)));
+            }
             self.rest = rest.strip_prefix(b"\n").unwrap_or(rest);
             self.taken += line.len() + 1;
             let line = line.strip_suffix(b"\r").unwrap_or(line);

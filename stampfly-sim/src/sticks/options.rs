@@ -44,7 +44,8 @@ pub enum Start {
     PowerOn,
     /// When the vehicle may be armed: it begins disarmed.
     Ready,
-    /// On the ground, when the vehicle has been armed: it begins armed, with the throttle at its lowest.
+    /// On the ground, when the vehicle has been armed: it begins armed, with the throttle at its
+    /// lowest.
     Armed,
     /// In the air, at this height above the ground, m: it begins armed, with the throttle raised.
     Height(f32),
@@ -99,7 +100,8 @@ impl StickOptions {
 }
 
 impl Sticks {
-    /// What these options mean to a vehicle whose throttle stick is this. `mode` is the mode that its options name.
+    /// What these options mean to a vehicle whose throttle stick is this. `mode` is the mode that
+    /// its options name.
     ///
     /// # Errors
     /// When the file is none, or a number is out of its range.

@@ -1,12 +1,14 @@
 //! A throttle stick of one vehicle as that of another.
 //!
-//! In the modes whose throttle is a thrust, vehicles differ in the stick that carries them, and a recording is cut from a flight of
-//! another one. In the modes that hold their height, the centre does so on every vehicle.
+//! In the modes whose throttle is a thrust, vehicles differ in the stick that carries them, and a
+//! recording is cut from a flight of another one. In the modes that hold their height, the centre
+//! does so on every vehicle.
 
 use super::file::StickFile;
 use stampfly_types::messages::FlightMode;
 
-/// A hover that was measured is not nearer to an end of the stick than this: what is below it needs room.
+/// A hover that was measured is not nearer to an end of the stick than this: what is below it needs
+/// room.
 const ROOM: f32 = 0.1;
 /// Below this a throttle is at rest: the vehicle stands, falls or coasts, and does not hover.
 const AT_REST: f32 = -0.95;
@@ -36,7 +38,8 @@ pub struct Throttle {
     pub rest: f32,
     /// The stick with which it hovers there.
     pub hover: f32,
-    /// The stick with which the vehicle of the file hovered there; `None` for a file that was made for this one.
+    /// The stick with which the vehicle of the file hovered there; `None` for a file that was made
+    /// for this one.
     pub of_file: Option<f32>,
 }
 
@@ -67,8 +70,9 @@ fn between(stick: f32, [low, middle, high]: [f32; 3], [to_low, to_middle, to_hig
     }
 }
 
-/// The throttle with which the vehicle of a file hovered: the median, by time, of its armed rows in manual modes with the stick off its lowest. A vehicle that
-/// neither rises nor sinks over the whole flight has as much thrust as weight on the average. `None` when there is no such row.
+/// The throttle with which the vehicle of a file hovered: the median, by time, of its armed rows in
+/// manual modes with the stick off its lowest. A vehicle that neither rises nor sinks over the
+/// whole flight has as much thrust as weight on the average. `None` when there is no such row.
 pub(super) fn median(file: &StickFile) -> Option<f32> {
     let flies = |throttle: f32, arm: bool, mode: FlightMode| arm && mode.is_manual() && throttle > AT_REST;
     let mut spans: Vec<(f32, u64)> = file

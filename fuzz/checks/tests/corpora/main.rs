@@ -4,7 +4,7 @@
 use fuzz_checks::{
     compact_record, console_line, data_stream, estimator_stream, failsafe_stream, ground_ask, ground_http, hil_frames,
     hisky, mode_machine, parameter_image, radio_packets, receiver_bytes, rover_datagrams, secure_session,
-    services_cable, services_mavlink, services_msp, services_tello, tello_text, ulog, whole_stack,
+    services_cable, services_mavlink, services_msp, services_tello, stick_file, tello_text, ulog, whole_stack,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -148,6 +148,11 @@ fn small_transmitters() {
 #[test]
 fn words() {
     smoke("tello_text", tello_text, 20_000);
+}
+
+#[test]
+fn sticks() {
+    smoke("stick_file", stick_file, 5_000);
 }
 
 #[test]

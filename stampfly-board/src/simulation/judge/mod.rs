@@ -19,16 +19,27 @@
 //! excuses nothing. With a pilot, who holds a place less exactly, the bounds of `transparent` are twice as wide, and where it
 //! flies by sight, in all but POS_HOLD, four times.
 //!
+//! A flight by a stick file has no commanded path: it may end anywhere, and a person's sticks can
+//! fly a sound vehicle into the floor. So `flown-away` and `landed` are none of its ends, `cut` is
+//! one that was stopped in the air [by itself](interventions), and every end from `refused` to
+//! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound. Where
+//! the file begins armed, `refused` is not.
+//!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
 mod course;
+mod interventions;
 mod invariants;
 mod moments;
 mod sight;
+mod soundness;
 
 use super::mission::Mission;
+use crate::VehicleConfig;
 use crate::topics::Id;
 use course::{Course, VISITED};
+pub use interventions::Intervention;
+use interventions::Interventions;
 pub use invariants::Invariants;
 use moments::Moments;
 use serde::Serialize;
@@ -36,6 +47,7 @@ pub(super) use sight::Sight;
 use stampfly_flight::newest::message;
 use stampfly_sim::Truth;
 use stampfly_sim::fault::{Class, FAULT_ACTED, Injector};
+use stampfly_sim::sticks::{Start, Sticks};
 use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, SystemAlert};
 use stampfly_types::{Duration, FieldKind, Instant, Message, frame};
 use std::collections::BTreeSet;
@@ -115,6 +127,8 @@ pub struct Judgement {
     pub cut_height_m: Option<f64>,
     /// Alerts, in the order in which they began.
     pub alerts: Vec<AlertSpan>,
+    /// What the vehicle did by itself that changed the flight, in order.
+    pub interventions: Vec<Intervention>,
     /// Faults, as they were given.
     pub faults: Vec<FaultSpan>,
 }
@@ -131,6 +145,9 @@ struct Touch {
 pub(super) struct Judge {
     injector: Injector,
     invariants: Invariants,
+    interventions: Interventions,
+    /// A stick file is flown; is the vehicle to be armed by it, whatever the file does?
+    sticks: Option<bool>,
     moments: Moments,
     course: Course,
     /// How many times as wide the bounds of `transparent` are.
@@ -173,15 +190,12 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub fn new(
-        injector: &Injector,
-        mission: &Mission,
-        pilot: Option<FlightMode>,
-        hover_without_link: Duration,
-    ) -> Self {
+    pub fn new(injector: &Injector, mission: &Mission, pilot: Option<FlightMode>, config: &VehicleConfig) -> Self {
         Self {
             injector: injector.clone(),
-            invariants: Invariants::new(hover_without_link),
+            invariants: Invariants::new(config.mode.hover_without_link),
+            interventions: Interventions::new(injector, config),
+            sticks: None,
             moments: Moments::default(),
             course: Course::new(mission),
             wide: match pilot {
@@ -217,9 +231,16 @@ impl Judge {
         }
     }
 
+    /// The same, of a flight by a stick file.
+    pub fn of_sticks(self, sticks: &Sticks) -> Self {
+        let arms = matches!(sticks.start, Start::Armed | Start::Height(_));
+        Self { sticks: Some(arms), ..self }
+    }
+
     /// A sample was published.
     pub fn published(&mut self, id: Id, at: Instant, words: &[u32]) {
         self.invariants.published(id, at, words);
+        self.interventions.published(id, at, words);
         if id == Id::system_alert
             && let Some(alert) = message::<SystemAlert>(words)
         {
@@ -282,6 +303,7 @@ impl Judge {
     pub fn see(&mut self, sight: &Sight<'_>) {
         let Sight { now, truth, clearance, strikes, status, done } = *sight;
         self.strikes(now, strikes);
+        self.interventions.see(sight);
         self.clearance = clearance;
         (self.now, self.done) = (now, done);
         self.start = self.start.or(Some(now));
@@ -348,8 +370,16 @@ impl Judge {
             })
             .collect();
         self.invariants.require(FAULT_ACTED, faults.iter().all(|span| span.since.is_some() && span.changes > 0));
-        let expected = self.injector.faults().map(|fault| fault.expected()).max().unwrap_or(Class::Degraded);
-        let (outcome, reason) = self.end(begun);
+        let of_faults = self.injector.faults().map(|fault| fault.expected()).max();
+        let (expected, (outcome, reason)) = match self.sticks {
+            None => (of_faults.unwrap_or(Class::Degraded), self.end(begun)),
+            Some(_) => (of_faults.unwrap_or(Class::Crashed).max(Class::Crashed), self.end_of_sticks(begun)),
+        };
+        let flew = count > 0 || outcome != Class::Refused;
+        let as_expected = match self.sticks {
+            None => outcome.is_within(expected) && flew,
+            Some(arms) => outcome <= expected && self.needless().is_none() && (flew || !arms),
+        };
         // Motors that were off already stayed off from the beginning of the fault.
         let stopped = if self.turned { self.stopped } else { Some((self.now, 0.0)) };
         let stopped = begun.zip(stopped).map(|(begun, (at, height))| {
@@ -362,7 +392,7 @@ impl Judge {
             outcome: outcome.name(),
             reason,
             expected: expected.name(),
-            as_expected: outcome.is_within(expected) && (count > 0 || outcome != Class::Refused),
+            as_expected,
             violations: self.invariants.violations().collect(),
             max_height_m: self.highest.into(),
             max_above_m: if above.is_finite() { above.into() } else { 0.0 },
@@ -371,6 +401,7 @@ impl Judge {
             cut_after_s: stopped.map(|(after, _)| after),
             cut_height_m: stopped.map(|(_, height)| height),
             alerts: self.spans,
+            interventions: self.interventions.list().to_vec(),
             faults,
         }
     }
@@ -436,6 +467,37 @@ impl Judge {
             return (Class::Transparent, String::new());
         };
         (Class::Degraded, reason)
+    }
+
+    /// The same for a flight by a stick file.
+    fn end_of_sticks(&self, begun: Option<Instant>) -> (Class, String) {
+        if let Some(needless) = self.needless() {
+            let Intervention { alert, height_m, .. } = needless;
+            let why = format!("the vehicle was sound, and {alert} {} at {height_m:.1} m", needless.verb());
+            let class = if needless.action == "cut" { Class::Cut } else { Class::Landed };
+            return (class, why);
+        }
+        let crash = self.crash(begun);
+        let stopped =
+            self.interventions.list().iter().find(|one| one.action == "cut" && one.height_m > OFF_GROUND.into());
+        if !self.turned {
+            (Class::Refused, "the motors never turned".into())
+        } else if self.motors_on {
+            (Class::KeptOn, "the motors were on at the end".into())
+        } else if let Some(Intervention { alert, height_m, .. }) = stopped {
+            (Class::Cut, format!("{alert} stops the motors at {height_m:.1} m of a vehicle that is not sound"))
+        } else if let Some(crash) = crash {
+            (Class::Crashed, format!("{crash}; so its sticks flew it"))
+        } else if !self.new_alerts.is_empty() {
+            (Class::Degraded, format!("alerts{}", listed(&self.new_alerts)))
+        } else {
+            (Class::Transparent, String::new())
+        }
+    }
+
+    /// The first thing that a sound vehicle did by itself.
+    fn needless(&self) -> Option<&Intervention> {
+        self.interventions.list().iter().find(|one| one.sound)
     }
 
     /// Why the flight is a crash, if it is one.

@@ -11,7 +11,7 @@ fn judge(faults: &[&str]) -> Judge {
     let faults: Vec<_> = faults.iter().filter_map(|text| Fault::parse(text, FAULTS).ok()).collect();
     let injector = Injector::new(Instant::ZERO, &faults);
     let mission = Mission::parse("arm\ntakeoff 0.5\ngoto 1 0 0.8\nland\n").expect("a mission");
-    Judge::new(&injector, &mission, None, Duration::from_secs(3))
+    Judge::new(&injector, &mission, None, &VehicleConfig::default())
 }
 
 fn status(phase: FlightPhase) -> FlightStatus {

@@ -1,7 +1,8 @@
 //! Many flights: `campaign`.
 
-use super::SceneOptions;
+use super::{SceneOptions, StickArguments};
 use crate::campaign::shard::Shard;
+use clap::builder::ArgPredicate;
 use clap::{Args, ValueEnum};
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -15,8 +16,9 @@ pub struct CampaignOptions {
     /// `--mission random --flights 500`.
     #[arg(long)]
     pub consistency: bool,
-    /// How many flights; 2000 with `--faults`.
-    #[arg(long, value_name = "N", default_value_t = 100, default_value_if("faults", "true", "2000"), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    /// How many flights; 2000 with `--faults`. With `--sticks`, how many of each file in each mode;
+    /// 3.
+    #[arg(long, value_name = "N", default_value_t = 100, default_value_ifs([("faults", "true".into(), "2000"), ("sticks", ArgPredicate::IsPresent, "3")]), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub flights: u64,
     /// Seed of the first flight; the others count up from there.
     #[arg(long, default_value_t = 1)]
@@ -27,6 +29,13 @@ pub struct CampaignOptions {
     pub faults: bool,
     #[command(flatten)]
     pub of_faults: FaultCampaignOptions,
+    /// Fly stick files, and the `.csv` files of folders: each as it is, and one with a single mode
+    /// in every other mode of the vehicle, too. Exit code 1 when a flight did not end well, or a
+    /// sound vehicle stopped its motors, landed or took another mode by itself.
+    #[arg(long, value_name = "PATH", num_args = 1.., group = "by_sticks", conflicts_with_all = ["mission", "consistency", "faults"])]
+    pub sticks: Vec<PathBuf>,
+    #[command(flatten)]
+    pub with_sticks: StickArguments,
 }
 
 /// Options of `campaign --faults`.

@@ -1,6 +1,6 @@
 //! What decides a simulated flight: `fly`, and what others take from it.
 
-use super::VehicleOption;
+use super::{StickArguments, VehicleOption};
 use crate::command_line::failure::Failure;
 use clap::Args;
 use stampfly_sim::vehicle::{Live, Options, Vehicle, WorldKind};
@@ -45,10 +45,11 @@ pub struct SceneOptions {
     #[arg(long, value_name = "NAME[=VALUE]@WHEN[+SECONDS]")]
     pub fault: Vec<String>,
     /// Fly the mission with the sticks of a simulated pilot.
-    #[arg(long)]
+    #[arg(long, group = "by_sticks")]
     pub pilot: bool,
-    /// The pilot's flight mode (StampFly: stabilize, acro, althold, poshold).
-    #[arg(long, value_name = "MODE", requires = "pilot")]
+    /// The pilot's flight mode (StampFly: stabilize, acro, althold, poshold), or the one in place
+    /// of a stick file's.
+    #[arg(long, value_name = "MODE", requires = "by_sticks")]
     pub mode: Option<String>,
     /// Delay and interrupt the executor, by this seed.
     #[arg(long, value_name = "SEED")]
@@ -66,6 +67,12 @@ pub struct SceneOptions {
 pub struct FlyOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
+    /// Fly what is in a stick file: CSV with the columns t, throttle, roll, pitch, yaw, mode, arm,
+    /// and maybe flip, kill, land.
+    #[arg(long, value_name = "FILE", group = "by_sticks", conflicts_with = "mission")]
+    pub sticks: Option<PathBuf>,
+    #[command(flatten)]
+    pub with_sticks: StickArguments,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -73,7 +80,7 @@ pub struct FlyOptions {
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
     /// Fly a flight of a campaign again, and compare its hash: exit code 1 when it is another.
-    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "world", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "jitter", "seed"])]
+    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "world", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "sticks", "jitter", "seed"])]
     pub from: Option<PathBuf>,
     /// Which one: its row in the file, from 0.
     #[arg(long, value_name = "N", requires = "from")]
@@ -82,7 +89,16 @@ pub struct FlyOptions {
 
 impl Default for FlyOptions {
     fn default() -> Self {
-        Self { scene: SceneOptions::default(), seed: 1, out: ".".into(), from: None, row: None }
+        let (scene, with_sticks) = (SceneOptions::default(), StickArguments::default());
+        Self { scene, sticks: None, with_sticks, seed: 1, out: ".".into(), from: None, row: None }
+    }
+}
+
+impl FlyOptions {
+    /// The flight these options describe, as a vehicle takes them.
+    pub fn options(&self) -> Options {
+        let sticks = |file: &PathBuf| self.with_sticks.options(file, self.scene.mode.clone());
+        Options { sticks: self.sticks.as_ref().map(sticks), ..self.scene.options(self.scene.jitter) }
     }
 }
 
@@ -118,6 +134,7 @@ impl SceneOptions {
             jitter,
             fault,
             pilot,
+            sticks: None,
             live: None,
         }
     }

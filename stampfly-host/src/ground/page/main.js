@@ -148,6 +148,7 @@ const frame = (now) => {
 buildTabs();
 buildControls();
 buildSticks();
+buildStickFile();
 buildPanels();
 buildPlayback();
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { styles = getComputedStyle(document.documentElement); });

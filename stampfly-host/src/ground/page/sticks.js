@@ -49,7 +49,8 @@ const readKeys = () => {
 
 const tickSticks = () => {
   const vehicle = live();
-  if (!(sticks.isKeyboard || sticks.isGamepad) || !vehicle) return;
+  if (!(sticks.isKeyboard || sticks.isGamepad || played.isPlaying) || !vehicle) return;
+  if (played.isPlaying) { sendStickFile(vehicle); return; }
   const pad = sticks.isGamepad ? readGamepad() : null;
   const isLost = sticks.isGamepad && !sticks.isKeyboard && !pad;
   setText(element('pad-state'), sticks.isGamepad ? (pad ? 'gamepad heard' : 'press a button of the gamepad') : '');
@@ -67,6 +68,16 @@ const tickSticks = () => {
   if (sticks.kill) sticks.arm = false;
 };
 
+/** A frame of the stick file. The kill switch of the page ends it. */
+const sendStickFile = (vehicle) => {
+  const frame = sticks.kill ? null : nextStickFrame(vehicle);
+  if (!frame) { stopStickFile(); return; }
+  const { roll, pitch, yaw, throttle, mode, arm, kill } = frame;
+  sticks.now = { roll, pitch, yaw, throttle };
+  say(vehicle.number, { do: 'sticks', roll, pitch, yaw, throttle, mode, arm: arm && !kill && sticks.sent > SEEN, kill });
+  Object.assign(sticks, { sent: sticks.sent + 1, arm, mode });
+};
+
 const drawSticks = () => {
   if (element('sticks-left').closest('[hidden]')) return;
   const pairs = [['sticks-left', sticks.now.yaw, sticks.now.throttle], ['sticks-right', sticks.now.roll, sticks.now.pitch]];
@@ -75,7 +86,7 @@ const drawSticks = () => {
     context.strokeStyle = color('--line');
     strokePoints(context, [[width / 2, 4], [width / 2, height - 4]]);
     strokePoints(context, [[4, height / 2], [width - 4, height / 2]]);
-    context.fillStyle = color(sticks.isKeyboard || sticks.isGamepad ? '--accent' : '--dim');
+    context.fillStyle = color(sticks.isKeyboard || sticks.isGamepad || played.isPlaying ? '--accent' : '--dim');
     context.beginPath();
     context.arc(width / 2 + right * (width / 2 - 12), height / 2 - up * (height / 2 - 12), 8, 0, 2 * Math.PI);
     context.fill();
@@ -87,12 +98,14 @@ const drawSticks = () => {
 const dropSticks = () => {
   Object.assign(sticks, { isKeyboard: false, isGamepad: false, arm: false, kill: false, sent: 0, now: { roll: 0, pitch: 0, yaw: 0, throttle: 0 } });
   sticks.keys.clear();
+  stopStickFile();
   for (const id of ['by-keyboard', 'by-gamepad']) element(id).setAttribute('aria-pressed', false);
 };
 
 /** The first of both is switched on or off: the arm switch begins off. Not while the other one flies. */
 const beginSticks = () => {
   sticks.kill = false;
+  stopStickFile();
   if (!sticks.isKeyboard && !sticks.isGamepad) Object.assign(sticks, { arm: false, sent: 0 });
 };
 

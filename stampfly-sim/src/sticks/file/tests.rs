@@ -87,6 +87,10 @@ fn what_is_too_much_is_refused_before_it_is_read() {
     let many: String = (0..=MOST_ROWS).map(row).collect();
     assert_eq!(refused(&many), format!("line {}: there are more than {MOST_ROWS} rows", MOST_ROWS + 2));
     let held = "0,0,0,0,0,acro,1\n".repeat(MOST_BYTES / 17 + 10);
+    // As it is read from a file, cut off in a line.
+    let cut = format!("{HEADER}\n{held}");
+    let cut = StickFile::parse(&cut.as_bytes()[..=MOST_BYTES]).expect_err("too large");
+    assert_eq!(cut.kind, StickErrorKind::TooLarge, "{cut}");
     assert!(refused(&held).ends_with("the file is larger than 16777216 bytes"), "rows that repeat one count, too");
 }
 

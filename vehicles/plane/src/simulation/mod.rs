@@ -59,6 +59,9 @@ impl Vehicle for Plane {
         if *cameras || *chips || pilot.is_some() {
             return Err("this vehicle has no cameras, no emulated chips and no pilot".into());
         }
+        if options.sticks.is_some() {
+            return Err("this vehicle has no sticks: it flies missions".into());
+        }
         let wind = WindConfig { gust: 0.3, ..WindConfig::MEADOW };
         let new = SimulationConfig::new(plant::PLANT);
         let mut simulation = SimulationConfig { seed, vibration: VIBRATION, wind, ..new };

@@ -44,6 +44,9 @@ impl Vehicle for Rover {
         if pilot.is_some() {
             return Err("the rover has no pilot: its missions say who drives".into());
         }
+        if options.sticks.is_some() {
+            return Err("the rover has no sticks: its missions say who drives, and how".into());
+        }
         if !plant.is_empty()
             || *world != WorldKind::Gentle
             || vibration.is_some()

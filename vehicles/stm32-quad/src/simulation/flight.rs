@@ -112,7 +112,10 @@ impl vehicle::Surroundings for Surroundings {
         tasks.spawn(convert(clock.clone(), world.clone(), setup.parameters.battery, outside.battery));
         radio::start(tasks, clock, &wrong.air, seed, sticks, outside.receiver);
         let pilot = Pilot::new(clock, world, sticks, setup.parameters.stick, setup.acro).with_lights(lights);
-        tasks.spawn(pilot.fly(&setup.mission, progress));
+        match &setup.sticks {
+            Some(sticks) => tasks.spawn(pilot.play(sticks, progress)),
+            None => tasks.spawn(pilot.fly(&setup.mission, progress)),
+        }
         if let Some(live) = &setup.live {
             let services = serial::services(live, &wrong.injector, &setup.parameters, newest, outside.link);
             tasks.spawn(live.serve(clock.clone(), ground::PERIOD, services));
@@ -284,6 +287,7 @@ impl vehicle::Around for Around<'_> {
         let Self { seen, lights, mut outcome, progress, spectator, wrong, setup, .. } = self;
         outcome.finished = progress.finished.get();
         outcome.live = self.setup.live.is_some();
+        outcome.by_sticks = self.setup.sticks.is_some();
         outcome.legs[0] = progress.legs.get();
         outcome.end(&setup.faults, Some(&wrong.injector), spectator.truth(), lights.get().armed);
         let seconds = f64::from(seen.looks) * LOOK.seconds_f64();

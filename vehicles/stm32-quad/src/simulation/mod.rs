@@ -26,12 +26,13 @@ use crate::parameters::Parameters;
 use crate::schedule::Runnables;
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::fault::FaultKind;
-use stampfly_sim::sight::Places;
+use stampfly_sim::sight::{Leg, Places};
+use stampfly_sim::sticks::{StickOptions, Sticks};
 use stampfly_sim::vehicle::{
     self, Ended, FlightOptions, Options, Page, PortSpec, Setting, SetupError, Variety, Vehicle, Witness, table,
 };
 use stampfly_sim::{SimulationConfig, Truth};
-use stampfly_types::{Duration, Message};
+use stampfly_types::{Duration, Message, Vec3};
 use std::prelude::v1::*;
 
 /// The quadcopter, for programs that fly vehicles.
@@ -50,6 +51,15 @@ const MISSIONS: [(&str, &str); 2] =
 fn mission_of(text: &str) -> Result<Places, SetupError> {
     let places = MISSIONS.iter().find(|(name, _)| *name == text).map_or(text, |(_, places)| places);
     places.parse().map_err(|error| format!("--mission {text}: hover, square, or places: {error}"))
+}
+
+/// Is the mode of this name ACRO? ANGLE is the one without a name.
+fn is_acro(mode: &str) -> Result<bool, SetupError> {
+    match mode {
+        "" | "angle" => Ok(false),
+        "acro" => Ok(true),
+        other => Err(format!("--mode '{other}' is none of angle, acro")),
+    }
 }
 
 impl Vehicle for Stm32Quad {
@@ -74,20 +84,19 @@ impl Vehicle for Stm32Quad {
         options.change(&mut simulation)?;
         let mut parameters = plant::parameters();
         table::change(&mut parameters, options)?;
-        let acro = match pilot.as_deref() {
-            None | Some("" | "angle") => false,
-            Some("acro") => true,
-            Some(other) => return Err(format!("--mode '{other}' is none of angle, acro")),
-        };
+        let acro = is_acro(pilot.as_deref().unwrap_or_default())?;
+        let sticks = options.sticks.as_ref().map(|typed| pilot::sticks_of(typed, options)).transpose()?;
         // In live hands it stands with its transmitter on, unless somebody is to fly it.
         let mission = match (mission.as_deref(), live) {
             (None, Some(_)) => Places::default(),
+            _ if sticks.is_some() => Places(vec![Leg { place: Vec3::zeros(), stay: 0.0 }]),
             (name, _) => mission_of(name.unwrap_or("hover"))?,
         };
         Ok(Setup {
             simulation,
             parameters,
             mission,
+            sticks,
             acro,
             faults: options.faults(Self::FAULTS)?,
             jitter: *jitter,
@@ -96,8 +105,14 @@ impl Vehicle for Stm32Quad {
         })
     }
 
+    fn settled(options: &Options, _seed: u64) -> Result<Options, SetupError> {
+        let sticks = options.sticks.as_ref().map(StickOptions::settled).transpose()?;
+        Ok(Options { sticks, ..options.clone() })
+    }
+
     fn options(setup: &Setup) -> FlightOptions {
-        FlightOptions { start: setup.simulation.start, limit: LIMIT, jitter: setup.jitter }
+        let played = setup.sticks.as_ref().map_or(Duration::ZERO, Sticks::length);
+        FlightOptions { start: setup.simulation.start, limit: LIMIT + played, jitter: setup.jitter }
     }
 
     fn config(setup: &Setup) -> &Parameters {

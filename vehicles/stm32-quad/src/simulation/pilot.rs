@@ -3,6 +3,10 @@
 //! The pilot sees the vehicle and its lights, and repeats a gesture that they do not answer: a packet was lost. Sticks are angles in
 //! ANGLE and rates in ACRO; throttle is thrust in both.
 
+mod sticks;
+
+pub(super) use sticks::sticks_of;
+
 use super::plant::HOVER;
 use crate::messages::ControlState;
 use crate::parameters::StickParameters;
@@ -95,7 +99,7 @@ impl<'a> Pilot<'a> {
     /// Flies it. Without a place to fly to it is made ready and stands.
     pub async fn fly(mut self, places: &Places, progress: &Progress) {
         self.hold(Sticks::REST, 1.0).await;
-        let is_calibrated = self.gesture(CALIBRATE, |lights| lights.calibrating, 2.2).await;
+        let is_calibrated = self.calibrate().await;
         if places.0.is_empty() {
             return;
         }
@@ -112,6 +116,10 @@ impl<'a> Pilot<'a> {
         self.hold(DISARM, 0.5).await;
         self.transmitter.set(Sticks::REST);
         progress.finished.set(true);
+    }
+
+    async fn calibrate(&mut self) -> bool {
+        self.gesture(CALIBRATE, |lights| lights.calibrating, 2.2).await
     }
 
     /// Makes a gesture until the lights say that it was seen, and waits for some seconds after it. Was it?

@@ -4,6 +4,7 @@ use crate::parameters::Parameters;
 use stampfly_sim::SimulationConfig;
 use stampfly_sim::fault::Fault;
 use stampfly_sim::sight::Places;
+use stampfly_sim::sticks::Sticks;
 use stampfly_sim::vehicle::Live;
 use std::prelude::v1::*;
 
@@ -16,6 +17,8 @@ pub struct Setup {
     pub parameters: Parameters,
     /// What to fly; nothing is to stand with the transmitter on.
     pub mission: Places,
+    /// A stick file is flown, instead of the mission.
+    pub sticks: Option<Sticks>,
     /// In ACRO, not in ANGLE.
     pub acro: bool,
     /// What goes wrong.

@@ -1,6 +1,7 @@
 //! Flights in simulation. With `FLIGHTS=100` as many of each kind.
 
 use stampfly_sim::plant::{Plant, PlantParameters, Pose, WindConfig};
+use stampfly_sim::sticks::StickOptions;
 use stampfly_sim::vehicle::{Options, Variety, Vehicle, Verdict};
 use stampfly_stm32_quad::simulation::plant::{HOVER, PLANT};
 use stampfly_stm32_quad::simulation::{Outcome, Stm32Quad};
@@ -119,4 +120,30 @@ fn every_number_is_in_its_range_and_the_throttle_carries_it() {
 fn with_the_real_drivers_it_flies_as_well() {
     let outcome = fly(&Options { chips: true, mission: Some("0,0,1,3".into()), ..Options::default() }, 1);
     assert!(outcome.succeeded(), "{}: {:?}", outcome.sentence(), outcome.figures());
+}
+
+fn sticks(rows: &str) -> Options {
+    let file = format!("t,throttle,roll,pitch,yaw,mode,arm,land\n{rows}\n");
+    Options { sticks: Some(StickOptions { file, ..StickOptions::default() }), ..Options::default() }
+}
+
+#[test]
+fn a_stick_file_is_flown_from_a_hover_and_landed() {
+    // The whole travel of the throttle is thrust, and 0.2 is the hover.
+    let hover = "0,0.2,0,0,0,stabilize,1,0\n1,0.2,0.2,0,0,stabilize,1,0\n2,0.2,0,0,0,acro,1,0\n2.5,0.2,0,0,0,stabilize,1,0\n3,0.2,0,0,0,stabilize,1,0";
+    let outcome = fly(&sticks(hover), 1);
+    assert!(outcome.succeeded() && outcome.touchdown < 2.5, "{} {:?}", outcome.sentence(), outcome.figures());
+    let ground =
+        "0,-1,0,0,0,stabilize,0,0\n5,-1,0,0,0,stabilize,1,0\n6,0.3,0,0,0,stabilize,1,0\n7.5,0.2,0,0,0,stabilize,1,0";
+    let outcome = fly(&sticks(ground), 1);
+    assert!(outcome.succeeded() && outcome.has_flown(), "{} {:?}", outcome.sentence(), outcome.figures());
+}
+
+#[test]
+fn sticks_that_let_it_fall_are_no_failure_and_what_the_transmitter_has_not_is_refused() {
+    let outcome = fly(&sticks("0,0.2,0,0,0,stabilize,1,0\n0.5,-1,0,0,0,stabilize,1,0\n3,-1,0,0,0,stabilize,1,0"), 1);
+    assert!(outcome.touchdown > 2.5 && outcome.succeeded(), "{} {:?}", outcome.sentence(), outcome.figures());
+    let refused = |rows: &str| Stm32Quad::setup(&sticks(rows), 1).expect_err("refused");
+    assert!(refused("0,0,0,0,0,acro,1,0\n2.5,0,0,0,0,althold,1,0").starts_with("--sticks: mode althold at 2.5 s"));
+    assert!(refused("0,0,0,0,0,acro,1,1").starts_with("--sticks: land at 0 s"));
 }

@@ -1,0 +1,169 @@
+//! Is the vehicle sound: does it do what its motors are told, and does it know how it is tilted?
+//!
+//! | asked | bound |
+//! |---|---|
+//! | does the body turn as the torque says, about roll and pitch? | over 0.1 s the rates change by what the demanded torque makes, as far as it was met, and by no more beside that than half of what a rotor that is lost at hover would add |
+//! | does the estimate know the vertical? | off by less than what the vehicle itself calls a mismatch of its tilt, [`FailsafeConfig::tilt_mismatch`](stampfly_mode::FailsafeConfig) |
+//! | was it left alone? | it has not touched anything for 0.1 s |
+//! | does the battery carry it? | its voltage is above the critical one |
+//! | does nothing act on it that a flight with a fault has? | no fault is active |
+//!
+//! All of it is the truth's: nothing here is a detector's opinion.
+
+use super::sight::Sight;
+use crate::VehicleConfig;
+use crate::airframe::AIRFRAME;
+use stampfly_sim::Truth;
+use stampfly_types::messages::{ControlOutput, MotorOutput, StateEstimate};
+use stampfly_types::{Duration, Instant, Vec3, math};
+use std::collections::VecDeque;
+
+/// Over this time the rates are compared with the torque: five lags of the motors, so that a step
+/// of the demand has arrived.
+const WINDOW: Duration = Duration::from_millis(100);
+/// Of the rate that a lost rotor makes in that time, which is told from a sound vehicle in the
+/// middle.
+const HALF: f32 = 0.5;
+/// A touch is over after this time.
+const TOUCHED: Duration = Duration::from_millis(100);
+/// Longest way to the floor along the body's axis that the range finder measures, m: the chip's.
+const REACH: f32 = 4.0;
+/// A sensor that sees nothing is lost after a second, and was not out of its reach if it saw the
+/// floor for the last half of that.
+const IN_REACH: Duration = Duration::from_millis(500);
+
+/// How the vehicle is, at an instant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct State {
+    /// By the table of the [module](self).
+    pub sound: bool,
+    /// The floor is in the reach of the sensors that look down, and has been for a while.
+    pub sees_floor: bool,
+    /// Above the floor, m.
+    pub height: f32,
+    /// m/s.
+    pub speed: f32,
+    /// rad.
+    pub tilt: f32,
+    /// Between the true vertical and the estimated one, rad.
+    pub attitude_error: f32,
+}
+
+/// A step of the comparison: rates, and what the torque has made of them since the beginning,
+/// rad/s.
+#[derive(Clone, Copy)]
+struct Turned {
+    at: Instant,
+    rate: Vec3,
+    by_torque: Vec3,
+}
+
+pub(super) struct Soundness {
+    tilt_mismatch: f32,
+    battery_critical: f32,
+    estimate: StateEstimate,
+    torque: Vec3,
+    /// Shares of it that were not met.
+    unmet: Vec3,
+    /// What the motors have made of it, behind their lag.
+    made: Vec3,
+    steps: VecDeque<Turned>,
+    strikes: u64,
+    touched: Option<Instant>,
+    touches: bool,
+    out_of_reach: Option<Instant>,
+    state: State,
+}
+
+impl Soundness {
+    pub fn new(config: &VehicleConfig) -> Self {
+        Self {
+            tilt_mismatch: config.failsafe.tilt_mismatch,
+            battery_critical: config.failsafe.battery_critical,
+            estimate: StateEstimate::default(),
+            torque: Vec3::zeros(),
+            unmet: Vec3::zeros(),
+            made: Vec3::zeros(),
+            steps: VecDeque::new(),
+            strikes: 0,
+            touched: None,
+            touches: false,
+            out_of_reach: None,
+            state: State::default(),
+        }
+    }
+
+    pub fn estimated(&mut self, estimate: StateEstimate) {
+        self.estimate = estimate;
+    }
+
+    pub fn demanded(&mut self, output: &ControlOutput) {
+        self.torque = output.torque;
+    }
+
+    pub fn driven(&mut self, output: &MotorOutput) {
+        let [roll, pitch, yaw, _] = output.unmet;
+        self.unmet = Vec3::new(roll, pitch, yaw);
+        if !output.armed {
+            self.unmet = Vec3::repeat(1.0);
+        }
+    }
+
+    /// Looks at the truth. `faulty`: a fault is active.
+    pub fn see(&mut self, sight: &Sight<'_>, faulty: bool) {
+        let Sight { now, truth, clearance, strikes, .. } = *sight;
+        let follows = self.follows(now, truth);
+        if truth.contact || strikes > self.strikes {
+            (self.touched, self.strikes) = (Some(now), strikes);
+        }
+        let up = |attitude: &stampfly_types::Quat| attitude.inverse() * Vec3::new(0.0, 0.0, -1.0);
+        let cos = up(&truth.attitude).dot(&up(&self.estimate.attitude)).clamp(-1.0, 1.0);
+        let attitude_error = math::acos(cos);
+        let cos_tilt = stampfly_types::frame::cos_tilt(&truth.attitude);
+        if clearance > REACH * cos_tilt {
+            self.out_of_reach = Some(now);
+        }
+        let touched = self.touched.is_some_and(|touched| now.since(touched) <= TOUCHED);
+        self.touches = touched;
+        let carried = truth.battery_voltage > self.battery_critical;
+        self.state = State {
+            sound: follows && attitude_error < self.tilt_mismatch && !touched && carried && !faulty,
+            sees_floor: self.out_of_reach.is_none_or(|out| now.since(out) > IN_REACH),
+            height: clearance,
+            speed: truth.velocity.norm(),
+            tilt: stampfly_types::frame::tilt(&truth.attitude),
+            attitude_error,
+        };
+    }
+
+    /// Had it touched something in the last tenth of a second, when it was last looked at?
+    pub const fn touches(&self) -> bool {
+        self.touches
+    }
+
+    /// How it was when it was last looked at.
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// Have the rates of the last tenth of a second changed as the torque says?
+    fn follows(&mut self, now: Instant, truth: &Truth) -> bool {
+        let inertia = AIRFRAME.inertia;
+        let met = self.torque.component_mul(&(Vec3::repeat(1.0) - self.unmet));
+        let (rate, last) = (truth.angular_rate, self.steps.back().copied());
+        let by_torque = last.map_or_else(Vec3::zeros, |last| {
+            let dt = now.since(last.at).seconds();
+            self.made += (met - self.made) * (dt / AIRFRAME.motor_lag).min(1.0);
+            let gyroscopic = rate.cross(&inertia.component_mul(&rate));
+            last.by_torque + (self.made - gyroscopic).component_div(&inertia) * dt
+        });
+        self.steps.push_back(Turned { at: now, rate, by_torque });
+        while self.steps.len() > 2 && self.steps.get(1).is_some_and(|step| now.since(step.at) >= WINDOW) {
+            self.steps.pop_front();
+        }
+        let Some(first) = self.steps.front() else { return true };
+        let beside = (rate - first.rate) - (by_torque - first.by_torque);
+        let lost = AIRFRAME.rotor_torque().component_div(&inertia) * (HALF * WINDOW.seconds());
+        beside.x.abs() < lost.x && beside.y.abs() < lost.y
+    }
+}

@@ -1,0 +1,107 @@
+//! `stampfly campaign --sticks`: stick files, each in every mode that makes sense. Exit code 1 when
+//! a flight did not end well.
+
+use crate::campaign::parallel;
+use crate::campaign::sticks::{Flight, Sum, cells, files, fly_one, sums};
+use crate::command_line::arguments::CampaignOptions;
+use crate::command_line::failure::Failure;
+use crate::command_line::terminal;
+use serde_json::json;
+use stampfly_sim::vehicle::Vehicle;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Largest number of flights that ended badly whose reason is printed.
+const MOST_TOLD: usize = 30;
+/// The mode of a file that is flown as it is.
+const AS_IT_IS: &str = "–";
+
+pub fn run<V: Vehicle>(options: &CampaignOptions) -> Result<ExitCode, Failure> {
+    let flown = options.scene.options(options.scene.jitter);
+    let mut all = Vec::new();
+    for file in files(&options.sticks)? {
+        let sticks = options.with_sticks.options(&file, options.scene.mode.clone());
+        all.extend(cells::<V>(&file, &sticks, &flown)?);
+    }
+    let seeds = usize::try_from(options.flights)?;
+    let count = all.len().checked_mul(seeds).ok_or("--flights: too many")?;
+    let bar = terminal::bar(count as u64, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");
+    let begun = Instant::now();
+    let flights = parallel::each(count, parallel::workers(count, None), &|place| {
+        let nth = (place % seeds) as u64;
+        let mut cell = all.get(place / seeds)?.clone();
+        // Every flight has its own delays, too.
+        cell.options.jitter = cell.options.jitter.map(|seed| seed.wrapping_add(nth));
+        let flight = fly_one::<V>(&cell, options.seed.wrapping_add(nth));
+        bar.inc(1);
+        Some(flight)
+    });
+    bar.finish_and_clear();
+    let flights: Vec<Flight> = flights.into_iter().flatten().collect::<Result<_, _>>()?;
+    let sums = sums(&flights);
+    if options.scene.json {
+        print_json(&flights, &sums);
+    } else {
+        print(&flights, &sums, begun.elapsed().as_secs_f64());
+    }
+    Ok(if flights.iter().all(|flight| flight.ended_well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn print_json(flights: &[Flight], sums: &[Sum]) {
+    outln!(
+        "{}",
+        json!({
+            "flights": flights.len(), "ended_well": flights.iter().filter(|flight| flight.ended_well).count(),
+            "while_sound": total(sums, |sum| &sum.while_sound), "cells": sums, "each": flights,
+        })
+    );
+}
+
+fn print(flights: &[Flight], sums: &[Sum], wall: f64) {
+    let name = |file: &str| Path::new(file).file_name().map_or_else(String::new, |name| name.display().to_string());
+    let widest = sums.iter().map(|sum| name(&sum.file).chars().count()).max().unwrap_or_default().max(4);
+    outln!("{:<widest$} {:<10} {:>7} {:>5}  {:<34} by itself while sound", "file", "mode", "flights", "well", "ends");
+    for sum in sums {
+        let Sum { file, mode, flights, ended_well, outcomes, while_sound, .. } = sum;
+        let mode = mode.as_deref().unwrap_or(AS_IT_IS);
+        let (ends, sound) = (counts(outcomes), counts(while_sound));
+        outln!("{:<widest$} {mode:<10} {flights:>7} {ended_well:>5}  {ends:<34} {sound}", name(file));
+    }
+    let well = flights.iter().filter(|flight| flight.ended_well).count();
+    outln!("\n{well} of {} flights ended well", flights.len());
+    for (who, total) in [
+        ("sound vehicles", total(sums, |sum| &sum.while_sound)),
+        ("vehicles that were not sound", total(sums, |sum| &sum.while_not_sound)),
+    ] {
+        let total = if total.is_empty() { "nothing".into() } else { counts(&total) };
+        outln!("{who} did by themselves: {total}");
+    }
+    let failed: Vec<_> = flights.iter().filter(|flight| !flight.ended_well).collect();
+    for flight in failed.iter().take(MOST_TOLD) {
+        let broken = if flight.violations.is_empty() {
+            String::new()
+        } else {
+            format!(", VIOLATED {}", flight.violations.join(" "))
+        };
+        outln!("  {}: {}{broken}\n    {}", flight.outcome, flight.reason, flight.line);
+    }
+    if failed.len() > MOST_TOLD {
+        outln!("  and {} more; --json has all of them", failed.len() - MOST_TOLD);
+    }
+    let simulated: f64 = flights.iter().map(|flight| flight.duration_s).sum();
+    outln!("\n{simulated:.0} s flown in {wall:.1} s");
+}
+
+fn counts(counts: &BTreeMap<String, usize>) -> String {
+    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
+}
+
+fn total(sums: &[Sum], of: fn(&Sum) -> &BTreeMap<String, usize>) -> BTreeMap<String, usize> {
+    let mut total = BTreeMap::new();
+    for (name, count) in sums.iter().flat_map(of) {
+        *total.entry(name.clone()).or_default() += count;
+    }
+    total
+}
