@@ -50,7 +50,7 @@ pub struct Intervention {
     pub t_s: f64,
     /// The alerts that made it do so, with `+` between two; `CUT_OFF`; `NONE` when there was none.
     pub alert: String,
-    /// `cut`, `land` or `mode`; see the [module](self) documentation.
+    /// `cut`, `land` or `mode`.
     pub action: &'static str,
     /// Was the vehicle sound, so that it had no need to?
     pub sound: bool,

@@ -21,7 +21,7 @@
 //!
 //! A flight by a stick file has no commanded path: it may end anywhere, and a person's sticks can
 //! fly a sound vehicle into the floor. So `flown-away` and `landed` are none of its ends, `cut` is
-//! one that was stopped in the air [by itself](interventions), and every end from `refused` to
+//! one that was stopped in the air by itself (`interventions.rs`), and every end from `refused` to
 //! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound. Where
 //! the file begins armed, `refused` is not.
 //!
