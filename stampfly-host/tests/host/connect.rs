@@ -3,24 +3,16 @@
 #[cfg(unix)]
 use crate::program::signal;
 use crate::program::{Program, folder, interrupt};
+use crate::real_time::in_real_time;
 use serde_json::{Value, json};
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Command;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
 const SOON: Duration = Duration::from_secs(20);
-/// Tests that fly in real time run one after the other: together they would measure the machine.
-static REAL_TIME: Mutex<()> = Mutex::new(());
-
-/// Waits until no other test flies in real time.
-pub fn alone() -> MutexGuard<'static, ()> {
-    REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// A vehicle whose line is that TCP port, and where it is.
 fn vehicle(folder: &Path, number: u16) -> (Program, String) {
     Program::serve(folder, &format!("usb-tcp={number}"), &[])
@@ -115,7 +107,7 @@ pub fn is_up(up: bool) -> impl Fn(&Value) -> bool {
 
 #[test]
 fn a_page_sees_asks_and_changes_a_vehicle_over_its_line_and_is_told_when_it_is_gone() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "page");
     let (serving, place) = vehicle(&folder, 0);
     let (mut connected, mut socket) = connect(&folder, &format!("tcp:{place}"), &[]);
@@ -192,7 +184,7 @@ pub fn passes(socket: &mut WebSocket<TcpStream>, seconds: u32) {
 
 #[test]
 fn a_flight_is_recorded_over_the_line_and_replays_bit_for_bit_around_parameters_that_change_between_hops() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "record");
     let (_serving, place) = vehicle(&folder, 0);
     recorded(&folder, &format!("tcp:{place}"), &[]);
@@ -240,7 +232,7 @@ pub fn recorded(folder: &Path, place: &str, more: &[&str]) {
 
 #[test]
 fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_with_two() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "codes");
     let code = |arguments: &[&str]| {
         let ports = ["--port", "http=0", "--port", "mavlink-udp=off", "--port", "mavlink-tcp=off", "--for", "1"];
@@ -261,7 +253,7 @@ fn a_place_where_nobody_is_is_waited_for_and_ends_with_one_and_one_that_is_none_
 #[test]
 #[cfg(unix)]
 fn a_computer_that_sleeps_for_a_moment_loses_neither_the_line_nor_the_page() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sleep");
     let (serving, place) = vehicle(&folder, 0);
     let (connected, mut socket) = connect(&folder, &format!("tcp:{place}"), &[]);

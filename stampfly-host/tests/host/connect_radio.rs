@@ -1,9 +1,10 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
 use crate::connect::{
-    alive, alone, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample,
+    alive, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample,
 };
 use crate::program::{Program, folder, interrupt};
+use crate::real_time::in_real_time;
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::ops::Range;
@@ -63,7 +64,7 @@ fn fly(socket: &mut WebSocket<TcpStream>, down: usize) {
 
 #[test]
 fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sealed");
     let (ours, others) = (key(&folder, "ours", 1), key(&folder, "others", 2));
     let (serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -123,7 +124,7 @@ fn a_page_sees_asks_and_flies_a_vehicle_with_its_key_and_not_with_another() {
 
 #[test]
 fn a_flight_is_recorded_by_radio_and_replays_bit_for_bit() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sealed_record");
     let ours = key(&folder, "ours", 1);
     let (_serving, place) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -192,7 +193,7 @@ fn pass(random: &mut u64, bytes: &mut [u8], send: impl Fn(&[u8])) {
 
 #[test]
 fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sealed_lossy");
     let ours = key(&folder, "ours", 1);
     let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -216,7 +217,7 @@ fn a_page_flies_and_kills_a_vehicle_over_a_radio_that_loses_a_third() {
 
 #[test]
 fn a_radio_that_a_fault_silences_is_silent_for_a_station_with_the_key() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sealed_silent");
     let ours = key(&folder, "ours", 1);
     let ports = ["serve", "--port", "others=off", "--port", "http=0", "--port", "sealed=0", "--key", &ours];
@@ -270,7 +271,7 @@ fn refused(answer: &Value, holder: &str) {
 
 #[test]
 fn a_page_commands_and_a_station_by_radio_is_refused_and_told_who_does_and_may_kill() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let Shared { serving: _serving, connected: _connected, mut beside, mut radio, down } = Shared::new("page_first");
     passes(&mut beside, 1);
     guided(&mut beside, 8, json!({ "kind": "arm" }));
@@ -289,7 +290,7 @@ fn a_page_commands_and_a_station_by_radio_is_refused_and_told_who_does_and_may_k
 
 #[test]
 fn a_station_by_radio_commands_and_a_page_is_refused_and_keeps_nothing_in_the_air_when_the_station_has_left() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let Shared { serving: _serving, connected, mut beside, mut radio, down } = Shared::new("radio_first");
     passes(&mut radio, 1);
     guided(&mut radio, 8, json!({ "kind": "arm" }));
@@ -333,7 +334,7 @@ fn a_station_by_radio_commands_and_a_page_is_refused_and_keeps_nothing_in_the_ai
 
 #[test]
 fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "sealed_flood");
     let ours = key(&folder, "ours", 1);
     let (_serving, vehicle) = Program::serve(&folder, "sealed=0", &["--key", &ours]);
@@ -362,7 +363,7 @@ fn strangers_that_ask_all_the_time_do_not_keep_the_station_out() {
 
 #[test]
 fn a_key_is_for_the_radio_and_the_radio_wants_one() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("connect", "keys");
     let ours = key(&folder, "ours", 1);
     for arguments in [&["connect", "udp:127.0.0.1"][..], &["connect", "tcp:127.0.0.1:5763", "--key", &ours]] {

@@ -1,6 +1,6 @@
 //! What comes through the ports of `serve` and does not belong there.
 
-use crate::connect::alone;
+use crate::real_time::in_real_time;
 use crate::program::{Program, folder};
 use std::io::{Read, Write};
 use std::net::{TcpStream, UdpSocket};
@@ -18,7 +18,7 @@ fn served(place: &str) -> Option<TcpStream> {
 
 #[test]
 fn connections_that_only_listen_keep_no_program_out() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("doors", "silent");
     let (_serving, place) = Program::serve(&folder, "mavlink-tcp=0", &[]);
     let silent: Vec<_> = (0..16).map(|_| served(&place).expect("it listens")).collect();
@@ -30,7 +30,7 @@ fn connections_that_only_listen_keep_no_program_out() {
 
 #[test]
 fn a_connection_that_speaks_http_is_ended_and_said() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("doors", "http");
     for port in ["mavlink-tcp", "console", "msp", "usb-tcp"] {
         let (mut serving, place) = Program::serve(&folder, &format!("{port}=0"), &[]);
@@ -49,7 +49,7 @@ fn a_connection_that_speaks_http_is_ended_and_said() {
 
 #[test]
 fn a_port_that_commands_is_not_opened_to_others_without_a_key() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let folder = folder("doors", "others");
     for port in ["http", "mavlink-tcp", "mavlink-udp", "tello", "stream", "console", "msp", "usb-tcp"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stampfly"));
@@ -62,7 +62,7 @@ fn a_port_that_commands_is_not_opened_to_others_without_a_key() {
 
 #[test]
 fn a_text_program_whose_state_port_is_off_hears_its_answers_alone() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let (_serving, place) = Program::serve(&folder("doors", "text"), "tello=0", &[]);
     let socket = UdpSocket::bind("127.0.0.1:0").expect("a port");
     socket.connect(place).expect("an address");

@@ -1,7 +1,8 @@
 //! Commands that a network holds up, on every path from a page or a program to a vehicle: they are
 //! refused, and the vehicle does nothing when they come. Motors off is done.
 
-use crate::connect::{alone, page};
+use crate::connect::page;
+use crate::real_time::in_real_time;
 use crate::connect_radio::key;
 use crate::doorstep::{MavlinkProgram, Observer, Speaker, WebProgram};
 use crate::program::{Program, folder};
@@ -165,7 +166,7 @@ fn radio() -> Route {
 
 #[test]
 fn what_a_network_holds_up_is_refused_on_every_path_and_what_stops_motors_is_done() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let routes: [fn() -> Route; _] = [
         || served_page("serve page", true),
         || served_page("serve page, no time", false),

@@ -1,7 +1,8 @@
 //! The commander of a vehicle that flies leaves, and others, who only watch, say on that they are
 //! there: the vehicle notices in the time that is documented for one who is alone, and lands.
 
-use crate::connect::{alone, page};
+use crate::connect::page;
+use crate::real_time::in_real_time;
 use crate::connect_radio::key;
 use crate::doorstep::{MavlinkProgram, Observer, Speaker, WebProgram};
 use crate::program::{Program, folder};
@@ -165,7 +166,7 @@ fn two_pages_by_radio() -> Crowd {
 
 #[test]
 fn a_commander_who_leaves_is_missed_in_time_whoever_else_is_there() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let crowds: [fn() -> Crowd; 8] = [
         two_pages,
         two_stations_of_one_number,

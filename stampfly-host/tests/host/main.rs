@@ -40,6 +40,7 @@ mod made_up;
 mod missions;
 mod plane;
 mod program;
+mod real_time;
 mod record;
 mod record_by_radio;
 mod reference;

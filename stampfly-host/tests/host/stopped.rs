@@ -2,7 +2,7 @@
 //!
 //! Only where a test can stop a program.
 
-use crate::connect::alone;
+use crate::real_time::in_real_time;
 use crate::program::{Program, folder, signal};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
@@ -50,7 +50,7 @@ fn ask(socket: &UdpSocket, text: &str) -> String {
 
 #[test]
 fn text_commands_that_came_while_it_was_stopped_are_expired_and_what_ends_a_flight_is_done() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let (program, socket) = tello("tello");
     assert_eq!(ask(&socket, "command"), "ok");
     let said = ["takeoff", "speed 80", "rc 50 0 0 0", "rc 50 0 0 0", "speed?", "forward 50", "emergency", "land"];
@@ -64,7 +64,7 @@ fn text_commands_that_came_while_it_was_stopped_are_expired_and_what_ends_a_flig
 
 #[test]
 fn gains_that_came_while_it_was_stopped_are_not_changed() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let framed = |id: u8, payload: &[u8]| {
         let mut bytes = vec![b'$', b'M', b'<', payload.len() as u8, id];
         bytes.extend(payload);
@@ -100,7 +100,7 @@ fn gains_that_came_while_it_was_stopped_are_not_changed() {
 
 #[test]
 fn a_command_that_came_while_it_was_stopped_is_refused_and_one_that_ends_a_flight_is_not() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let command = |command, param1| {
         let (target_system, target_component) = (1, 1);
         let command = COMMAND_LONG_DATA { command, param1, target_system, target_component, ..Default::default() };
@@ -146,7 +146,7 @@ fn a_command_that_came_while_it_was_stopped_is_refused_and_one_that_ends_a_fligh
 
 #[test]
 fn a_line_that_was_typed_while_it_was_stopped_is_expired_at_the_console_and_on_the_cable() {
-    let _alone = alone();
+    let _flies = in_real_time();
     for port in ["console", "usb-tcp"] {
         let (program, place) = Program::serve(&folder("stopped", port), &format!("{port}=0"), &[]);
         let mut stream = TcpStream::connect(place).expect("it listens");

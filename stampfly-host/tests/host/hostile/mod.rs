@@ -3,7 +3,8 @@
 
 mod vehicle;
 
-use crate::connect::{alone, message, next, page};
+use crate::connect::{message, next, page};
+use crate::real_time::in_real_time;
 use crate::ground::get;
 use crate::program::{Program, folder};
 use rand_chacha::ChaCha8Rng;
@@ -126,7 +127,7 @@ impl Scene {
 
 #[test]
 fn nonsense_ends_neither_the_program_nor_its_page_and_costs_no_memory() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let mut scene = Scene::new("nonsense", &[]);
     let names: Vec<_> = topics().iter().map(|topic| topic.name).take(60).collect();
     let subscribe = json!({ "id": 9, "do": "subscribe", "topics": names, "rate": 50 });
@@ -161,7 +162,7 @@ fn nonsense_ends_neither_the_program_nor_its_page_and_costs_no_memory() {
 
 #[test]
 fn text_of_a_vehicle_reaches_pages_as_text() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let mut scene = Scene::new("text", &[]);
     let markup = "<img src=x onerror=alert(1)></script>\"'&amp;\u{202e}";
     // In its notices there are no control characters, and in MAVLink's texts few of any kind.
@@ -196,7 +197,7 @@ fn text_of_a_vehicle_reaches_pages_as_text() {
 
 #[test]
 fn an_answer_that_does_not_end_is_given_up_and_the_next_line_is_answered() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let mut scene = Scene::new("answer", &[]);
     let done = Payload::Reply { text: "done", last: true };
     let line = |text: &str| json!({ "do": "console", "line": text });
@@ -224,7 +225,7 @@ fn an_answer_that_does_not_end_is_given_up_and_the_next_line_is_answered() {
 
 #[test]
 fn a_record_that_begins_again_and_again_does_not_fill_the_folder_with_files() {
-    let _alone = alone();
+    let _flies = in_real_time();
     let mut scene = Scene::new("record", &["--record", "flight.sfr"]);
     let chunks = [0, 1, 0, 7, u32::MAX, 3].map(|number| {
         let mut room = [0; 64];
