@@ -1,8 +1,6 @@
 //! `stampfly connect` with a vehicle in a network: sealed frames between a simulated vehicle's port and a page's socket, and what a radio does to them.
 
-use crate::connect::{
-    alive, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample,
-};
+use crate::connect::{alive, ask, ask_once, connect, is_done, is_up, next, page, passes, rate, recorded, sample};
 use crate::program::{Program, folder, interrupt};
 use crate::real_time::in_real_time;
 use serde_json::{Value, json};

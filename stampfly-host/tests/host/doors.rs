@@ -1,7 +1,7 @@
 //! What comes through the ports of `serve` and does not belong there.
 
-use crate::real_time::in_real_time;
 use crate::program::{Program, folder};
+use crate::real_time::in_real_time;
 use std::io::{Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::process::Command;

@@ -2,10 +2,10 @@
 //! there: the vehicle notices in the time that is documented for one who is alone, and lands.
 
 use crate::connect::page;
-use crate::real_time::in_real_time;
 use crate::connect_radio::key;
 use crate::doorstep::{MavlinkProgram, Observer, Speaker, WebProgram};
 use crate::program::{Program, folder};
+use crate::real_time::in_real_time;
 use std::net::UdpSocket;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -2,8 +2,8 @@
 //!
 //! Only where a test can stop a program.
 
-use crate::real_time::in_real_time;
 use crate::program::{Program, folder, signal};
+use crate::real_time::in_real_time;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use std::io::{Read as _, Write as _};

@@ -4,9 +4,9 @@
 mod vehicle;
 
 use crate::connect::{message, next, page};
-use crate::real_time::in_real_time;
 use crate::ground::get;
 use crate::program::{Program, folder};
+use crate::real_time::in_real_time;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
