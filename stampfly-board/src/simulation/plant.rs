@@ -64,6 +64,21 @@ mod tests {
         }
     }
 
+    /// Where the loop over the voltage of the step before swung between 1.4 and 4.3 V.
+    #[test]
+    fn a_published_pack_of_0_28_ohm_is_steady() {
+        let weak = PlantParameters { manufacturing_spread: 0.0, battery_resistance: 0.28, ..PLANT };
+        let mut plant = Plant::new(&weak, &WindConfig::CALM, Some(&Pose::hovering(1000.0)), 1);
+        plant.set_duty([0.95; 4]);
+        (0..3200).for_each(|_| plant.step());
+        let mut voltages = [(); 50].map(|()| {
+            plant.step();
+            plant.battery().voltage()
+        });
+        voltages.sort_by(f64::total_cmp);
+        assert!(voltages[49] - voltages[0] < 1e-3 && voltages[0] > 2.0, "{} to {} V", voltages[0], voltages[49]);
+    }
+
     #[test]
     fn a_hover_needs_two_thirds_of_the_duty_and_drains_the_battery_in_four_minutes() {
         let pose = Pose::hovering(1000.0);

@@ -1,7 +1,10 @@
 //! Lithium cells of the high-voltage kind, in series.
 //!
-//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly.
-//! Temperature and ageing are left out; set the resistances and the capacity instead.
+//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly. Temperature and ageing change
+//! these: `wear.rs`.
+//!
+//! Battery and motors are one circuit: the voltage of the one is the current of the others. [`Battery::under`] solves it as it is; a loop that takes the voltage of the
+//! step before swings from step to step as soon as the resistance times the motors' conductance exceeds one, 0.21 Ω for a StampFly.
 
 /// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge (typical discharge curve at rest).
 const OPEN_CIRCUIT: [f64; 11] = [3.20, 3.58, 3.67, 3.72, 3.76, 3.81, 3.88, 3.97, 4.08, 4.20, 4.35];
@@ -27,6 +30,38 @@ impl BatterySpec {
     /// A full cell of 1 A·h, of no maker.
     pub const CELL: Self =
         Self { cells: 1.0, charge: 1.0, capacity: 1.0, resistance: 0.02, polarisation: 0.01, time_constant: 10.0 };
+}
+
+/// Something that draws the more current, the more voltage there is, and nothing below some voltage: a motor that turns.
+///
+/// ```
+/// use stampfly_sim::plant::{Battery, BatterySpec, Load};
+/// let battery = Battery::new(&BatterySpec { resistance: 0.5, ..BatterySpec::CELL }, 0.0);
+/// // A motor of 0.5 Ω whose own voltage is 2 V: what is above that is halved.
+/// let motor = Load { conductance: 2.0, back: 4.0 };
+/// let voltage = battery.under(0.0, &[motor]);
+/// assert!((voltage - 0.5 * (4.35 + 2.0)).abs() < 1e-9);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// A/V.
+    pub conductance: f64,
+    /// What its own voltage keeps back, A.
+    pub back: f64,
+}
+
+impl Load {
+    /// Of a motor with this duty cycle, resistance, Ω, and own voltage, V.
+    pub(super) fn of_motor(duty: f64, resistance: f64, own: f64) -> Self {
+        let share = duty / resistance;
+        Self { conductance: duty * share, back: share * own }
+    }
+
+    /// Current at a voltage, A.
+    #[must_use]
+    pub fn current(&self, voltage: f64) -> f64 {
+        (self.conductance * voltage - self.back).max(0.0)
+    }
 }
 
 /// The battery.
@@ -88,6 +123,25 @@ impl Battery {
         };
         battery.step(0.0, current);
         battery
+    }
+
+    /// The terminal voltage at which these loads, and what always draws `idle` amperes, take what the battery gives, V.
+    #[must_use]
+    pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
+        let source = self.open_circuit() - self.polarisation - self.resistance * idle;
+        let mut voltage = source;
+        // Linear for the loads that draw. Without one that does not the voltage is lower, so that none comes back: no more passes than loads.
+        for _ in 0..=loads.len() {
+            let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
+            let (conductance, back) =
+                drawing.fold((0.0, 0.0), |(sum, back), load| (sum + load.conductance, back + load.back));
+            let solved = (source + self.resistance * back) / (1.0 + self.resistance * conductance);
+            if solved == voltage {
+                break;
+            }
+            voltage = solved;
+        }
+        voltage.max(0.0)
     }
 
     /// Draws `current` amperes for `dt` seconds.
@@ -162,6 +216,24 @@ mod tests {
         }
         assert!((battery.voltage() - battery.open_circuit()).abs() < 1e-4);
         assert!((battery.drawn() - 4.0 * 30.001).abs() < 1e-6);
+    }
+
+    #[test]
+    fn battery_and_loads_are_one_circuit() {
+        for (resistance, duty) in [(0.0, 1.0), (0.06, 0.6), (0.28, 1.0), (1.0, 1.0)] {
+            let battery = Battery::new(&BatterySpec { resistance, ..SPEC }, 0.0);
+            // One stands, one turns slowly, one fast, and one so fast that it draws nothing.
+            let loads = [0.0, 1.0, 2.0, 5.0].map(|own| Load::of_motor(duty, 0.76, own));
+            let voltage = battery.under(0.15, &loads);
+            let current = 0.15 + loads.iter().map(|load| load.current(voltage)).sum::<f64>();
+            assert!(
+                (battery.open_circuit() - resistance * current - voltage).abs() < 1e-9,
+                "{resistance} Ω: {voltage}"
+            );
+            assert_eq!(loads[3].current(voltage), 0.0);
+        }
+        let short = Battery::new(&SPEC, 0.0).under(200.0, &[]);
+        assert_eq!(short, 0.0, "a battery gives no negative voltage");
     }
 
     #[test]

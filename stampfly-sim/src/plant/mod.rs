@@ -32,7 +32,7 @@ mod wind;
 use air::{Air, Push};
 
 pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};
-pub use battery::{Battery, BatterySpec};
+pub use battery::{Battery, BatterySpec, Load};
 pub use body::{Airframe, Body, Disturbance};
 pub use check::FullThrottle;
 pub use ground::Ground;
@@ -165,7 +165,8 @@ impl Plant {
         if let Some(air) = &self.air {
             lift *= air.lift(m, &self.scene);
         }
-        let loads = self.rotors.step(DT, self.battery.voltage(), lift);
+        let voltage = self.battery.under(p.board_current, &self.rotors.loads());
+        let loads = self.rotors.step(DT, voltage, lift);
         let current = loads.current + p.board_current;
         self.battery.step(DT, current);
 

@@ -12,6 +12,7 @@
 //! measured fixes them for a given resistance (set dω/dt = 0 and compare powers of ω). The winding's inductance
 //! is left out, its time constant being some ten microseconds.
 
+use super::battery::Load;
 use super::lag::Lag;
 use super::{DT, PlantParameters};
 use crate::conditions::Conditions;
@@ -152,10 +153,21 @@ impl Rotors {
         self.hover_speed
     }
 
+    /// The duty cycles that the motors have, whatever is commanded.
+    fn switched(&self) -> [f64; ROTORS] {
+        core::array::from_fn(|i| self.faults[i].duty.unwrap_or(self.duty[i]))
+    }
+
+    /// What the motors are for the battery now.
+    pub(crate) fn loads(&self) -> [Load; ROTORS] {
+        let duty = self.switched();
+        core::array::from_fn(|i| Load::of_motor(duty[i], self.resistance[i], self.motor_constant[i] * self.speed[i]))
+    }
+
     /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`.
     pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64) -> RotorLoads {
         // Each line for all rotors, so that they are computed side by side.
-        let duty: [f64; ROTORS] = core::array::from_fn(|i| self.faults[i].duty.unwrap_or(self.duty[i]));
+        let duty = self.switched();
         let speed = self.speed;
         let current: [f64; ROTORS] = core::array::from_fn(|i| {
             ((duty[i] * voltage - self.motor_constant[i] * speed[i]) / self.resistance[i]).max(0.0)

@@ -200,3 +200,48 @@ proptest! {
         prop_assert!(motion.rotor_speed.iter().all(|w| (0.0..6000.0).contains(w)));
     }
 }
+
+/// The loop over the voltage of the step before swung by volts above 0.125 Ω with these motors.
+#[test]
+fn a_weak_battery_is_steady() {
+    let parameters = PlantParameters { battery_resistance: 0.28, battery_polarisation: 0.0, ..perfect() };
+    let mut plant = calm(&parameters, Some(&Pose::hovering(1000.0)));
+    plant.set_duty([1.0; 4]);
+    run(&mut plant, 1.0);
+    let voltages: Vec<_> = (0..50)
+        .map(|_| {
+            plant.step();
+            let (battery, current) = (plant.battery(), plant.motion().current);
+            let left = battery.open_circuit() - current * parameters.battery_resistance;
+            assert!((left - battery.voltage()).abs() < 1e-3, "{left} {}", battery.voltage());
+            battery.voltage()
+        })
+        .collect();
+    let (low, high) = voltages.iter().fold((f64::MAX, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
+    assert!(high - low < 1e-3 && low > 2.0, "{low} to {high} V");
+}
+
+#[test]
+fn what_leaves_the_battery_heats_it_and_the_motors_and_turns_the_rotors() {
+    for battery_resistance in [0.05, 0.28] {
+        let parameters = PlantParameters { battery_resistance, battery_polarisation: 0.0, ..perfect() };
+        let constant = parameters.torque_coefficient / parameters.motor_voltage_a * parameters.motor_resistance;
+        let mut plant = calm(&parameters, Some(&Pose::hovering(1000.0)));
+        let (mut given, mut taken) = (0.0, 0.0);
+        for step in 0..1600 {
+            // Up and down between idle and full, each motor at its own time.
+            let duty: [f64; 4] = core::array::from_fn(|motor| f64::from((step / 40 + 3 * motor as u32) % 11) / 10.0);
+            plant.set_duty(duty);
+            let (speed, open) = (plant.rotors().speed(), plant.battery().open_circuit());
+            plant.step();
+            let (voltage, current) = (plant.battery().voltage(), plant.motion().current);
+            given += open * current;
+            taken += current * current * battery_resistance + parameters.board_current * voltage;
+            for (duty, speed) in duty.into_iter().zip(speed) {
+                let winding = ((duty * voltage - constant * speed) / parameters.motor_resistance).max(0.0);
+                taken += winding * (winding * parameters.motor_resistance + constant * speed);
+            }
+        }
+        assert!((taken / given - 1.0).abs() < 1e-3, "{battery_resistance} Ω: {taken} of {given}");
+    }
+}

@@ -142,7 +142,8 @@ impl Aeroplane {
         let angles = core::array::from_fn(|i| shares[i] * reaches[i]);
         let air = self.through_air();
 
-        let thrust = self.propeller.step(DT, self.battery.voltage(), air.x);
+        let voltage = self.battery.under(p.board_current, &[self.propeller.load()]);
+        let thrust = self.propeller.step(DT, voltage, air.x);
         let current = thrust.current + p.board_current;
         self.battery.step(DT, current);
         let (mut force, mut torque) =

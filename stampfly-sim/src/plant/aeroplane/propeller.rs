@@ -10,6 +10,7 @@
 
 use super::AeroplaneParameters;
 use crate::plant::RotorFault;
+use crate::plant::battery::Load;
 use core::f64::consts::TAU;
 
 /// What the propeller does to the body in one step.
@@ -101,9 +102,19 @@ impl Propeller {
         self.constant * speed + self.resistance * current.max(0.0)
     }
 
+    /// The duty cycle that the motor has, whatever is commanded.
+    fn switched(&self) -> f64 {
+        self.fault.duty.unwrap_or(self.duty)
+    }
+
+    /// What the motor is for the battery now.
+    pub(super) fn load(&self) -> Load {
+        Load::of_motor(self.switched(), self.resistance, self.constant * self.speed)
+    }
+
     /// One step of `dt` seconds on `voltage`.
     pub(super) fn step(&mut self, dt: f64, voltage: f64, air: f64) -> PropellerLoads {
-        let duty = self.fault.duty.unwrap_or(self.duty);
+        let duty = self.switched();
         let current = ((duty * voltage - self.constant * self.speed) / self.resistance).max(0.0);
         let [thrust, drag] = self.at(self.speed, air);
         let net = self.constant * (current - self.idle_current) - drag;
