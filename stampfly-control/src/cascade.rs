@@ -303,7 +303,12 @@ impl<R: RateLaw> Controller for CascadeController<R> {
             }
         };
         let trim = LEAN * self.attitude.tilt_gain;
-        let held = self.answer.step(&intent, &target, &estimate.angular_rate, trim, dt);
+        // A load that lies askew lifts one leg first, and its torque has to be found before the
+        // others follow.
+        let lifts = input.flight_status.phase == FlightPhase::TakeOff;
+        let free = Intent { grounded: intent.grounded && !lifts, ..intent };
+        let [roll, pitch, yaw] = self.answer.step(&free, &target, &estimate.angular_rate, trim, dt);
+        let held = [roll, pitch, yaw || intent.grounded];
         let torque = self.rate.step(&target, &estimate.angular_rate, dt, input.unmet, held);
         ControlOutput { thrust, torque }
     }

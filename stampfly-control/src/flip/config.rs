@@ -51,6 +51,8 @@ pub struct FlipConfig {
     pub attitude: AttitudeConfig,
     /// Least height above the surface, m.
     pub height_min: f32,
+    /// How far it rises at most, m: the climb, and as far as it would climb on during the turn.
+    pub room: f32,
     /// Largest tilt, rad, rate, rad/s, horizontal and vertical speed, m/s, to begin with.
     pub steady: [f32; 4],
     /// Time between two flips.
@@ -92,6 +94,7 @@ impl FlipConfig {
             climb_gain: 5.0,
             attitude,
             height_min: if spare > 0.18 * GRAVITY { fall * fall / (2.0 * spare) } else { f32::INFINITY },
+            room: climb * climb / (2.0 * spare.max(1.0)) + climb * turn,
             steady: [0.26, 1.05, 0.3, 0.2],
             pause: Duration::from_secs(2),
         }

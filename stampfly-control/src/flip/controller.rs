@@ -144,6 +144,11 @@ impl FlipController {
         self.step(now, estimate, unmet)
     }
 
+    /// Levels it; see [`FlipSequencer::abort`].
+    pub fn abort(&mut self, now: Instant) {
+        self.sequence.abort(now);
+    }
+
     /// Ends it; see [`FlipSequencer::cancel`].
     pub fn cancel(&mut self, now: Instant) {
         self.sequence.cancel(now);

@@ -5,10 +5,12 @@
 //!   └─ too slow ─► recover    └─ too long, too fast ─► recover   └─ too long ─► over
 //! ```
 //!
-//! *Climb*: level with full thrust, because upside down there is none upwards. *Turn*: a trapezoid of the rate about one axis, on
-//! the angle that the gyro has turned through; thrust follows the cosine of it. *Recover*: the attitude loop levels it to the
-//! heading of before, thrust brakes the fall. Whatever goes wrong ends in the recovery, and the recovery ends. Sideways the two
-//! halves of the turn push against each other; what remains is for the position loop afterwards.
+//! *Climb*: level with full thrust, because upside down there is none upwards. *Turn*: a trapezoid
+//! of the rate about one axis, on the angle that the gyro has turned through; thrust follows the
+//! cosine of it. *Recover*: the attitude loop levels it to the heading of before, thrust brakes the
+//! fall. Whatever goes wrong ends in the recovery ([`FlipSequencer::abort`]), and the recovery
+//! ends. Sideways the two halves of the turn push against each other; what remains is for the
+//! position loop afterwards.
 //!
 //! [`FlipSequencer`] gives set-points for rate and thrust; [`FlipController`] makes thrust and torque of them, in place of the vehicle's
 //! controller for as long as it takes. Whoever starts it tells its failsafe, which would stop the motors of a vehicle that turns so fast.
@@ -171,7 +173,8 @@ impl FlipSequencer {
         if self.stage != FlipStage::Over || self.over.is_some_and(|over| now.since(over) < config.pause) {
             return Err(FlipRefusal::Busy);
         }
-        if !(is_known(estimate) && estimate.valid.contains(Validity::HEIGHT)) {
+        let climb_known = climb_rate(estimate).is_some();
+        if !(is_known(estimate) && climb_known && estimate.valid.contains(Validity::HEIGHT)) {
             return Err(FlipRefusal::Estimate);
         }
         // Comparisons are false for NaN, and then refuse.
@@ -199,7 +202,15 @@ impl FlipSequencer {
         Ok(())
     }
 
-    /// One control period of a sequence that is not over. `estimate` may be anything: one without a tilt is over.
+    /// Gives up climb or turn, and levels: something has failed.
+    pub fn abort(&mut self, now: Instant) {
+        if matches!(self.stage, FlipStage::Climb | FlipStage::Turn) {
+            self.enter(now, FlipStage::Recover);
+        }
+    }
+
+    /// One control period of a sequence that is not over. `estimate` may be anything: one without a
+    /// tilt is over, and without a climb rate it levels.
     pub fn step(&mut self, now: Instant, estimate: &StateEstimate) -> FlipDemand {
         let dt = self.timer.step(now);
         if !is_known(estimate) {
@@ -209,11 +220,11 @@ impl FlipSequencer {
         let config = self.config;
         match self.stage {
             FlipStage::Climb => {
-                // Down is positive.
-                if -estimate.velocity.z >= config.climb {
+                let climb = climb_rate(estimate);
+                if climb.is_some_and(|climb| climb >= config.climb) {
                     self.angle = self.sense * self.lean(estimate);
                     self.enter(now, FlipStage::Turn);
-                } else if elapsed >= config.climb_limit {
+                } else if climb.is_none() || elapsed >= config.climb_limit {
                     self.enter(now, FlipStage::Recover);
                 }
             }
@@ -229,7 +240,8 @@ impl FlipSequencer {
             FlipStage::Recover => {
                 let [climb, tilt, rate] = Self::AT_REST;
                 let level = attitude::down_in_body(&estimate.attitude).z >= math::cos(tilt);
-                let rests = estimate.velocity.z.abs() <= climb && estimate.angular_rate.norm() <= rate;
+                let stays = climb_rate(estimate).is_none_or(|known| known.abs() <= climb);
+                let rests = stays && estimate.angular_rate.norm() <= rate;
                 if (level && rests) || elapsed >= config.recover_limit {
                     self.finish(now, self.complete && level && rests);
                 }
@@ -312,16 +324,23 @@ impl FlipSequencer {
         if cos_tilt < Self::COS_USEFUL {
             return config.thrust_turn;
         }
-        let wanted = config.hover_thrust * (1.0 + config.climb_gain * estimate.velocity.z / GRAVITY) / cos_tilt;
+        let climb = climb_rate(estimate).unwrap_or_default();
+        let wanted = config.hover_thrust * (1.0 - config.climb_gain * climb / GRAVITY) / cos_tilt;
         within(wanted, config.thrust_turn, config.thrust_max)
     }
 }
 
-/// Are the numbers known that a flip is flown by? The height is not among them: upside down no range measures it.
+/// Are the numbers known that a turn is flown by? Height and climb rate are not among them: upside
+/// down no range measures them.
 fn is_known(estimate: &StateEstimate) -> bool {
-    let needed = Validity::TILT.with(Validity::VELOCITY_Z);
-    let numbers = estimate.angular_rate.sum() + estimate.velocity.z;
-    estimate.valid.contains(needed) && estimate.attitude.is_unit() && numbers.is_finite()
+    let tilt = estimate.valid.contains(Validity::TILT) && estimate.attitude.is_unit();
+    tilt && estimate.angular_rate.sum().is_finite()
+}
+
+/// How fast it climbs, m/s, if that is known.
+fn climb_rate(estimate: &StateEstimate) -> Option<f32> {
+    let known = estimate.valid.contains(Validity::VELOCITY_Z) && estimate.velocity.z.is_finite();
+    known.then_some(-estimate.velocity.z)
 }
 
 #[cfg(test)]

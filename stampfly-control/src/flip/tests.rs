@@ -47,12 +47,13 @@ fn a_weak_vehicle_never_turns_over() {
     assert_eq!(flip.start(NOW, FlipDirection::Left, &high), Err(FlipRefusal::Height));
 }
 
-/// Steps a vehicle that does exactly as it is told; gives the angle turned about roll and pitch, and the time it took.
-fn flown(direction: FlipDirection, estimate: &mut StateEstimate) -> (f32, f32, f32) {
+/// Steps a vehicle that does exactly as it is told; gives the angle turned about roll and pitch,
+/// the time it took, and how far it rose.
+fn flown(direction: FlipDirection, estimate: &mut StateEstimate) -> [f32; 4] {
     let airframe = Airframe::EXAMPLE;
     let (mut flip, mut now) = (flip(), NOW);
     flip.start(now, direction, estimate).expect("nothing speaks against it");
-    let (mut roll, mut pitch) = (0.0, 0.0);
+    let (mut roll, mut pitch, mut highest) = (0.0, 0.0, 0.0f32);
     while flip.stage() != FlipStage::Over {
         let demand = flip.step(now, estimate);
         let dt = PERIOD.seconds();
@@ -63,18 +64,19 @@ fn flown(direction: FlipDirection, estimate: &mut StateEstimate) -> (f32, f32, f
         estimate.velocity += (push + Vec3::new(0.0, 0.0, GRAVITY)) * dt;
         estimate.position += estimate.velocity * dt;
         (roll, pitch) = (roll + demand.rate.x * dt, pitch + demand.rate.y * dt);
+        highest = highest.max(-estimate.position.z);
         now += PERIOD;
         assert!(now.since(NOW) < Duration::from_secs(5), "it ends");
     }
     assert!(flip.is_complete());
-    (roll, pitch, now.since(NOW).seconds())
+    [roll, pitch, now.since(NOW).seconds(), highest]
 }
 
 #[test]
 fn it_turns_once_in_every_direction_and_ends_level_and_at_rest() {
     for direction in FlipDirection::ALL {
         let mut estimate = hover();
-        let (roll, pitch, seconds) = flown(*direction, &mut estimate);
+        let [roll, pitch, seconds, highest] = flown(*direction, &mut estimate);
         let expected = match direction {
             FlipDirection::Left => (-math::TAU, 0.0),
             FlipDirection::Right => (math::TAU, 0.0),
@@ -86,6 +88,7 @@ fn it_turns_once_in_every_direction_and_ends_level_and_at_rest() {
         let moved = estimate.position;
         println!("{direction:?}: {seconds:.2} s, moved by {moved:.2?} m");
         assert!(seconds < 2.0 && moved.norm() < 0.8, "{seconds} s, {moved}");
+        assert!(highest < FlipConfig::for_airframe(&Airframe::EXAMPLE).room, "{direction:?} rises by {highest} m");
     }
 }
 
@@ -116,4 +119,33 @@ fn an_estimate_that_breaks_ends_it() {
     let demand = flip.step(NOW + PERIOD, &broken);
     assert_eq!(flip.stage(), FlipStage::Over);
     assert!(demand.thrust.is_finite() && demand.rate == Vec3::zeros());
+}
+
+#[test]
+fn what_fails_on_the_way_is_levelled_and_a_turn_needs_no_climb_rate() {
+    let climbing = StateEstimate { velocity: Vec3::new(0.0, 0.0, -3.0), ..hover() };
+    let begun = |estimate: &StateEstimate| {
+        let mut flip = flip();
+        flip.start(NOW, FlipDirection::Right, &hover()).expect("nothing speaks against it");
+        flip.step(NOW + PERIOD, estimate);
+        flip
+    };
+    for estimate in [hover(), climbing] {
+        let mut flip = begun(&estimate);
+        flip.abort(NOW + PERIOD);
+        assert_eq!(flip.stage(), FlipStage::Recover);
+    }
+    let blind = StateEstimate { valid: Validity::TILT, ..climbing };
+    let mut turning = begun(&climbing);
+    turning.step(NOW + PERIOD, &blind);
+    assert_eq!(turning.stage(), FlipStage::Turn);
+    let mut rising = begun(&hover());
+    let demand = rising.step(NOW + PERIOD, &blind);
+    assert_eq!((rising.stage(), demand.thrust), (FlipStage::Recover, rising.config.hover_thrust));
+    rising.step(NOW + PERIOD, &blind);
+    assert_eq!(rising.stage(), FlipStage::Over, "level and at rest");
+    let leans = StateEstimate { attitude: Quat::from_euler_angles(0.5, 0.0, 0.0), ..blind };
+    let mut rising = begun(&leans);
+    let demand = rising.step(NOW + PERIOD, &leans);
+    assert!(rising.stage() == FlipStage::Recover && demand.rate.x < 0.0 && demand.thrust > rising.config.hover_thrust);
 }
