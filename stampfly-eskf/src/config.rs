@@ -17,8 +17,9 @@ pub struct EskfConfig {
     pub accel_vibration: f32,
     /// The same for the gyro.
     pub gyro_vibration: f32,
-    /// Largest angular acceleration of the body, rad/s². An inertial sample that asks for more is garbage, unless it goes
-    /// on: up to three running are bridged with the last sample before them.
+    /// Largest angular acceleration of the body, rad/s². An inertial sample that asks for more is
+    /// garbage, unless it goes on: up to three running that follow from each other, and 20 that do
+    /// not, are bridged with the last sample before them.
     pub angular_acceleration: f32,
     /// Full scale of the accelerometer, m/s²: a sample with every axis there is garbage in the same way.
     pub accel_full_scale: f32,

@@ -1,7 +1,7 @@
 //! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The
 //! models, and the conditions of each sensor, are in [`aid`](crate::aid).
 
-use super::flow_monitor::Verdict;
+use super::flow_monitor::{Turn, Verdict};
 use super::gate::{GateResult, Sensor};
 use super::vertical::Use;
 use super::wander::limited;
@@ -132,7 +132,7 @@ impl Eskf {
             return Err(Refusal::Tilt);
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
-        let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
+        let distance = (surface - delayed.state.position.z - self.vertical.claimed()) / delayed.rotation[2][2];
         if distance < self.config.flow_min_distance {
             return Err(Refusal::Range);
         }
@@ -148,8 +148,12 @@ impl Eskf {
             self.correct_gyro(&jump);
             return Ok(Fusion::Reset);
         }
-        if self.anchor.is_none() && self.flow_monitor.turns_fast([raw.y, -raw.x], flow.interval) {
-            return Err(Refusal::Range);
+        if self.anchor.is_none() {
+            match self.flow_monitor.turns_fast([raw.y, -raw.x], flow.interval) {
+                Turn::Slow => {}
+                Turn::Fast => return Err(Refusal::Range),
+                Turn::Over(angle) => self.inflate_turned(angle),
+            }
         }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
         // Written out: `map` would be a call.

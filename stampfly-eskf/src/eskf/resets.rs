@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
 //! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
+//! | a turn that is faster than flow follows | variance of the tilt | no |
 //! | the second opinion about the range ([`vertical`](super::vertical)) | climb rate, height, vertical accelerometer bias | no |
 //! | the second opinion about flow ([`flow_monitor`](super::flow_monitor)) | what flow did to tilt, gyro bias and velocity in the last second, or since the take-off | no |
 //! | the course of flow's difference ([`gyro`](super::flow_monitor)) | gyro bias, tilt, horizontal velocity | no |
@@ -12,6 +13,10 @@
 
 use super::*;
 
+/// Standard deviation of the tilt after a turn that flow did not see, share of the turn: errors of
+/// the gyro's scale and axes, of which 3 % are usual, and as much for a zero that has shifted
+/// meanwhile.
+const TURNED: f32 = 0.05;
 /// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
 /// and rad/s.
 const TILT_INFLATION: f32 = 0.1;
@@ -68,6 +73,15 @@ impl Eskf {
             self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
             // Tilt and accelerometer bias look alike to flow: the bias is estimated anew.
             self.reset_accel_bias(axis);
+        }
+    }
+
+    /// The vehicle has turned by this angle, rad, faster than flow follows.
+    pub(super) fn inflate_turned(&mut self, angle: f32) {
+        let tilt = TURNED * angle;
+        self.flow_monitor.inflated(tilt);
+        for axis in 0..2 {
+            self.covariance.inflate(ATTITUDE + axis, tilt * tilt);
         }
     }
 

@@ -8,14 +8,18 @@
 //! | the range is implausible when | |
 //! |---|---|
 //! | it repeats itself while the observer moves by [`MOVED`], right after a jump, for 1.5 s, or from the ground on for 3 s | stuck |
-//! | the filter's path while it fuses ranges and the barometer's differ by [`HEIGHT`] within some seconds | ramp |
+//! | the filter's path while it fuses ranges and the barometer's differ by [`HEIGHT`] within some seconds, and accelerometer and barometer agree | ramp |
 //! | the height was moved to it more than [`MOVES`] times within three seconds | aliased, an edge below |
 //! | it jumps more than five times within about two seconds | outliers, an edge below |
-//! | the barometer has risen by half a metre more than the filter's height within ten seconds of the take-off ([`rise`]) | aliased or scaled from the ground on |
+//! | the barometer has risen more than the filter's height within ten seconds of the take-off, by what neither propellers nor doors make ([`rise`]) | aliased or scaled from the ground on |
 //! | it jumps and stays there, and the vehicle does not move sideways | aliased, an offset, something below that was not there |
 //!
-//! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust changes. A range that is off by a
-//! constant is a table, and one that is off by a factor is found only where the path is long.
+//! The accelerometer alone convicts nobody: vibration moves its zero by 2 m/s² as the thrust
+//! changes. Nor does the barometer: a door moves the pressure by 18 Pa within a second, which is
+//! 1.5 m, and propellers press or suck. No vehicle moves so without feeling it: where the observer
+//! does not follow the barometer, the pressure has changed, and paths are compared anew from there
+//! on. A range that is off by a constant is a table, and one that is off by a factor is found only
+//! where the path is long.
 //!
 //! Until then two kinds of readings do no harm: one that repeats itself [`UNUSED`] times is not used, and one that leaps is
 //! rejected until another one confirms it.
@@ -83,6 +87,14 @@ const FIRST: f32 = 2.0;
 const BIAS_FOLLOWS: f32 = 1.0;
 /// The same for the climb rate, until the observer has settled.
 const CLIMB_FOLLOWS: f32 = 1.0;
+/// The barometer disagrees with the accelerometer when the mean over this time, s, of what the
+/// observer does not follow is so large, m: five standard deviations of it.
+const DISAGREES_OVER: f32 = 0.3;
+const DISAGREES: f32 = 0.25;
+/// So long the paths have to be apart, s: until then the disagreement would have shown.
+const APART_FOR: f32 = 0.5;
+/// For so long the pressure may go on changing, s.
+const SETTLES: f32 = 2.0;
 /// The height of a pressure step that no climb makes between two readings, m: the difference that convicts a range, so that a step
 /// alone convicts none.
 const PRESSURE_STEP: f32 = HEIGHT;
@@ -129,11 +141,19 @@ pub(super) struct VerticalMonitor {
     /// Altitudes running that are equal.
     baro_repeats: u32,
     rise: Rise,
+    /// Since when the paths are apart.
+    apart: Option<Instant>,
+    /// Mean of what the observer does not follow of the altitude, m.
+    unfollowed: f32,
+    /// By how much the height was put right when the barometer had the last word about it, m.
+    claimed: f32,
     rejected: Option<Instant>,
     /// Sum of the jumps that the filter's height was moved by lately.
     moved: f32,
     moves: u32,
     range: f32,
+    /// What the filter expected it to be, m.
+    expected: f32,
     range_at: Instant,
     /// Since a range was used, or could have been, s.
     unused: f32,
@@ -169,6 +189,13 @@ impl VerticalMonitor {
         self.implausible
     }
 
+    /// How much higher than the range's last word the vehicle is by the barometer alone, m. A
+    /// picture of the floor is not scaled by that: a velocity that is too small brakes less, and
+    /// one that is too large swings.
+    pub(super) fn claimed(&self) -> f32 {
+        self.claimed
+    }
+
     /// Has nothing that is to be believed told height and climb rate since the take-off?
     pub(super) fn knows_nothing(&self) -> bool {
         self.implausible && self.from_start
@@ -184,7 +211,7 @@ impl VerticalMonitor {
             range_at: self.range_at,
             stood: self.stood,
             altitude: self.altitude,
-            rise: self.rise,
+            rise: self.rise.at_rest(bias),
             ..Self::default()
         };
     }
@@ -199,6 +226,7 @@ impl VerticalMonitor {
     /// height.
     #[inline]
     pub(super) fn predict(&mut self, dt: f32, change: f32, climb: f32, bias: f32, height: f32) {
+        self.rise.felt(change, climb, dt);
         let change = change - self.bias * dt;
         self.height += (self.climb + 0.5 * change) * dt;
         self.climb += change;
@@ -251,10 +279,17 @@ impl VerticalMonitor {
         }
         let zero = self.zero.get_or_insert(altitude - self.height);
         let off = altitude - *zero - self.height;
+        self.unfollowed += (off - self.unfollowed) * (dt / (DISAGREES_OVER + dt));
         if stands {
             *zero += off * (dt / (0.3 + dt));
-        } else if off.abs() > PRESSURE_STEP {
+            self.unfollowed = 0.0;
+        } else if off.abs() > PRESSURE_STEP || self.age > SETTLED && self.unfollowed.abs() > DISAGREES {
             *zero += off;
+            // As after a start, but for the zero.
+            if self.age > SETTLED {
+                (self.path, self.unfollowed) = (0.0, 0.0);
+                (self.age, self.restarted) = (SETTLED - SETTLES, true);
+            }
         } else {
             let follows = if self.age < FIRST { FOLLOWS_FIRST } else { FOLLOWS };
             let rate = dt / follows;
@@ -267,10 +302,17 @@ impl VerticalMonitor {
 
     /// Takes a range before the filter does. `rejecting`: the filter rejected the one before.
     pub(super) fn range(&mut self, at: Instant, distance: f32, expected: f32, rejecting: bool) -> Use {
-        let dt = math::smaller(at.since(self.range_at).seconds(), 0.2);
-        let change = (distance - self.range).abs();
-        let jumps = change > JUMP && self.range > 0.0;
-        let leaps = change > LEAP && self.range > 0.0 && (distance - expected).abs() > LEAP;
+        let silence = at.since(self.range_at).seconds();
+        let dt = math::smaller(silence, 0.2);
+        // Nor does what the vehicle itself moves by: it falls at 5 m/s, and leans to the other side
+        // within two readings.
+        let moved = expected - self.expected;
+        let change = math::smaller((distance - self.range).abs(), (distance - self.range - moved).abs());
+        self.expected = expected;
+        // What the vehicle did while there was none is no jump.
+        let follows = self.range > 0.0 && silence < SILENT;
+        let jumps = follows && change > JUMP;
+        let leaps = follows && change > LEAP && (distance - expected).abs() > LEAP;
         self.rejecting = rejecting;
         if !rejecting {
             (self.rejected_since_jump, self.rejected_since_leap) = (jumps, leaps);
@@ -331,7 +373,7 @@ impl VerticalMonitor {
     /// From here on the range is implausible, and what it did before does not count again.
     fn leave_out(&mut self) {
         (self.implausible, self.path, self.moved, self.moves) = (true, 0.0, 0.0, 0);
-        self.rise = Rise::default();
+        (self.rise, self.claimed) = (Rise::default(), 0.0);
     }
 
     /// The filter moved its height up by this much, to the range.
@@ -369,7 +411,9 @@ impl VerticalMonitor {
             || self.repeats >= REPEATED_JUMPED && self.jumped
             || self.repeats >= REPEATED_ALWAYS
             || self.stood.saturating_add(self.repeats) >= REPEATED_STANDING;
-        let apart = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
+        let far = settled && self.path.abs() > HEIGHT && self.baro_repeats < REPEATED;
+        self.apart = self.apart.or(Some(now)).filter(|_| far);
+        let apart = self.apart.is_some_and(|since| now.since(since).seconds() >= APART_FOR);
         let above = self.rise.is_above();
         let wrong = stuck || apart || above.is_some() || self.jumps > JUMPS || (settled && self.moves > MOVES);
         if !wrong {
@@ -386,6 +430,9 @@ impl VerticalMonitor {
         self.climb = climb;
         self.from_start = young;
         self.leave_out();
+        if apart {
+            self.claimed = higher;
+        }
         misled.then_some(Correction { climb, bias: self.bias, higher })
     }
 }

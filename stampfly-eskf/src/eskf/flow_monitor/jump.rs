@@ -20,6 +20,8 @@ const WAITS: f32 = 0.1;
 pub(super) struct Jump {
     means: [[f32; 2]; 2],
     sum: [f32; 2],
+    /// Largest square of what single readings of each may be wrong by, m²/s².
+    uncertain: [f32; 3],
     readings: u32,
     /// Time since a jump, s, while it is none of the gyro's.
     since: Option<f32>,
@@ -33,6 +35,9 @@ impl Jump {
             *sum += apart / BLOCK as f32;
         }
         self.readings = self.readings.wrapping_add(1);
+        let [before, last, now] = self.uncertain;
+        self.uncertain = [before, last, now.max(uncertain)];
+        let uncertain = self.uncertain.into_iter().fold(0.0, f32::max);
         let (jump, limit) = (self.jump(), JUMP + PER_METRE * distance);
         let jumps = distance > SHARP && sure && jump > limit * limit + uncertain;
         self.since = self.since.map(|time| time + interval).or(jumps.then_some(0.0));
@@ -46,6 +51,8 @@ impl Jump {
         let mean = core::mem::take(&mut self.sum);
         let [before, last] = self.means;
         self.means = [last, mean];
+        let [_, second, third] = self.uncertain;
+        self.uncertain = [second, third, 0.0];
         let [x, y] = [mean[0] - before[0], mean[1] - before[1]];
         // Before the third block there is nothing to compare with.
         if self.readings < 3 * BLOCK { 0.0 } else { x * x + y * y }

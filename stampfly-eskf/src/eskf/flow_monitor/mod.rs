@@ -11,14 +11,17 @@
 //! | term | reason |
 //! |---|---|
 //! | constant, and for each metre of distance | accelerometer and tilt; resolution of the picture |
-//! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none |
+//! | share of the picture's motion, and of the motion that the body's turning gives it | a reading holds one frame, two or none; its scale; the camera's mounting |
+//! | turning's change within [`LATE`], times the distance | the picture is older than expected |
+//! | share of the velocity that was gained | the picture's scale |
 //! | standard deviation that was added to the tilt | the filter found its own tilt to be wrong, so the acceleration that is restored is wrong, too |
 //!
 //! Four things it leaves to others: what lies from the take-off on is [`departure`]'s, a picture that does not move is [`picture`]'s, a
 //! velocity that jumps [`jump`]'s, and whether it is not flow but the gyro that is wrong [`gyro`]'s.
 //!
-//! Not for an error of scale of some tens of per cent, nor for a constant offset that was there from the beginning: no
-//! other sensor on board measures a constant velocity.
+//! What single readings may be wrong by counts for as long as it stays in the difference. Not for
+//! an error of scale of some tens of per cent, nor for a constant offset that was there from the
+//! beginning: no other sensor on board measures a constant velocity.
 
 mod departure;
 mod gyro;
@@ -47,6 +50,11 @@ const PER_METRE: f32 = 0.15;
 /// one that is read early none. Such a single reading is wrong by all of the motion, of which [`SMOOTH`] lets a seventh
 /// through, and a quarter of two that follow each other.
 const SHARE: f32 = 0.25;
+/// A picture is as much older than expected, s: of cameras it is 4 to 12 ms old, and 4 are
+/// expected.
+const LATE: f32 = 0.008;
+/// Error of the picture's scale from one specimen to the next, share of the velocity.
+const SCALE: f32 = 0.12;
 /// Square of the velocity that vibration adds up to in the tenth of a second over which jumps are looked for, of its mean square change from
 /// sample to sample, s²: half of that, over 2.5 ms times 0.1 s, and 2.5 standard deviations.
 const SHAKES: f32 = 8.0e-4;
@@ -76,6 +84,17 @@ const AGREES_FOR: f32 = 0.5;
 /// for what begins while the motors spool up.
 const STANDING_RATE: [f32; 2] = [0.6, 1.0];
 const STANDING_SOON: f32 = 0.1;
+
+/// How the body turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Turn {
+    /// The picture shows its motion.
+    Slow,
+    /// Faster than the sensor follows, or it was a moment ago: the reading says nothing.
+    Fast,
+    /// No longer: it has turned by this angle, rad.
+    Over(f32),
+}
 
 /// What a reading has shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +128,10 @@ pub(super) struct FlowMonitor {
     apart: [f32; 2],
     jump: Jump,
     difference: [f32; 2],
+    /// Square of what readings were wrong by, as far as it is still in the difference, m²/s², and
+    /// the last turning.
+    uncertain: f32,
+    turning: [f32; 2],
     differs: f32,
     agrees: f32,
     picture: Picture,
@@ -118,8 +141,9 @@ pub(super) struct FlowMonitor {
     implausible: bool,
     /// How long it has to hold back, s.
     waits: f32,
-    /// The same after a fast turn.
+    /// The same after a fast turn, and its angle, rad.
     settles: f32,
+    turned: f32,
 }
 
 impl FlowMonitor {
@@ -163,27 +187,29 @@ impl FlowMonitor {
         self.tilt = tilt;
     }
 
-    /// Takes the turning of the picture that the body makes, rad/s. Is it, or was it a moment ago, faster than the sensor follows? Then
-    /// the reading says nothing.
+    /// Takes the turning of the picture that the body makes, rad/s.
     #[inline]
-    pub(super) fn turns_fast(&mut self, turning: [f32; 2], interval: f32) -> bool {
+    pub(super) fn turns_fast(&mut self, turning: [f32; 2], interval: f32) -> Turn {
         let [x, y] = turning;
+        let square = x * x + y * y;
         // Nothing but a fast turn begins it.
         let limit = if self.settles > 0.0 { CALM } else { FAST };
-        let fast = x * x + y * y > limit * limit;
+        let fast = square > limit * limit;
         self.settles = if fast { SETTLES } else { math::larger(self.settles - interval, 0.0) };
-        let unusable = self.settles > 0.0;
-        if unusable {
+        if self.settles > 0.0 {
+            self.turned += math::sqrt(square) * interval;
             self.last = None;
             self.forget();
+            return Turn::Fast;
         }
-        unusable
+        let turned = core::mem::take(&mut self.turned);
+        if turned > 0.0 { Turn::Over(turned) } else { Turn::Slow }
     }
 
     /// What was compared until now says nothing.
     pub(super) fn forget(&mut self) {
         (self.flow, self.inertial, self.difference) = Default::default();
-        (self.differs, self.agrees) = (0.0, 0.0);
+        (self.differs, self.agrees, self.uncertain) = (0.0, 0.0, 0.0);
         (self.readings, self.apart) = Default::default();
         self.jump.forget();
         self.record = Record::default();
@@ -272,13 +298,18 @@ impl FlowMonitor {
         self.record.reading(velocity, change, dt, distance);
         self.picture.step(counts, turning, distance, interval);
         let [base, share, tilt] = [DIFFERENCE + PER_METRE * distance, SHARE * distance, PER_RADIAN * self.tilt];
-        let uncertain = share * share * picture;
-        self.departure.reading(velocity, interval, uncertain, shaken);
+        let [x, y] = [turning[0] - self.turning[0], turning[1] - self.turning[1]];
+        self.turning = turning;
+        let late = LATE / interval * distance;
+        let uncertain = share * share * picture + late * late * (x * x + y * y) + SCALE * SCALE * motion;
+        // It leaves the difference as it came in: of squares, twice as fast.
+        self.uncertain = math::larger(uncertain, self.uncertain * (SMOOTH / (SMOOTH + 2.0 * dt)));
+        self.departure.reading(velocity, interval, self.uncertain, shaken);
         if !begins {
             self.jump.step(apart, distance, uncertain + SHAKES * shaken, interval, self.waits == 0.0);
         }
         // Of squares: a sum would do as well, and costs a root.
-        let limit = base * base + uncertain + tilt * tilt;
+        let limit = base * base + self.uncertain + tilt * tilt;
         self.differs = if difference > limit { self.differs + interval } else { 0.0 };
         if self.implausible {
             if motion > MOTION * MOTION && !begins {

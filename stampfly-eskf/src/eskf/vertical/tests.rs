@@ -93,3 +93,44 @@ fn what_the_filter_does_without_a_range_convicts_none() {
     assert!(!silent.is_implausible_after(0.5, 0.4, 0.5, lives), "and when it comes back");
     assert!(!silent.monitor.is_silent());
 }
+
+/// Six seconds of a sound range at half a metre, and then a pressure that changes by this much
+/// within so many seconds. Is the range implausible within four more?
+fn beside_a_door(size: f32, seconds: f32) -> bool {
+    let mut watched = Watched::standing(10, false);
+    assert!(!watched.is_implausible_after(6.0, 0.0, 0.5, |step| Some(distance(0.5, step))));
+    (0..400).any(|step| {
+        watched.steps += 1;
+        let now = watched.now();
+        watched.monitor.predict(DT, 0.0, 0.0, 0.0, 0.5);
+        if watched.steps.is_multiple_of(7) {
+            let altitude = 100.0 + size * (step as f32 * DT / seconds).min(1.0);
+            watched.monitor.baro(now, altitude + 1e-3 * (watched.steps % 5) as f32, 0.5, false);
+        }
+        if watched.steps.is_multiple_of(3) {
+            watched.monitor.range(now, distance(0.5, step), 0.5, false);
+        }
+        watched.monitor.judge(now, 0.5);
+        watched.monitor.is_implausible()
+    })
+}
+
+#[test]
+fn a_pressure_that_no_motion_explains_convicts_none() {
+    for size in [1.5, -1.5, 3.0, -3.0] {
+        for seconds in [0.05, 0.3, 0.8, 1.0] {
+            assert!(!beside_a_door(size, seconds), "{size} m in {seconds} s");
+        }
+    }
+}
+
+#[test]
+fn a_range_after_a_silence_does_not_jump() {
+    let after = |silence: u32| {
+        let mut watched = Watched::standing(10, false);
+        watched.is_implausible_after(5.0, 0.0, 0.5, |step| Some(distance(0.5, step)));
+        watched.steps += silence;
+        watched.monitor.range(watched.now(), 0.8, 0.5, false)
+    };
+    assert_eq!([3, 30].map(after), [Use::Reject, Use::Gate]);
+}
