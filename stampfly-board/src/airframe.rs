@@ -26,8 +26,15 @@ pub const MOTOR_VOLTAGE: [f64; 3] = [6.0368e-8, 6.699_042e-4, 1.53e-2];
 pub const ROTOR_INERTIA: f64 = 1.375e-8;
 /// Drag along body x and y over speed, N/(m/s) (typical for the size).
 pub const DRAG: f64 = 0.015;
+/// Thrust that is lost by climbing over climb rate, at the rotors' speed of a hover, N/(m/s): 1.4
+/// 1/s of damping (theory).
+pub const DRAG_VERTICAL: f64 = 0.0515;
+/// Drag of the body over the square of the speed, N/(m/s)² (a flat plate of its size).
+pub const DRAG_SQUARE: f64 = 0.004;
 /// Height of the body's origin, and of the bottom range finder, when standing, m (range finder logs).
 pub const GROUND_HEIGHT: f64 = 0.03;
+/// Distance of each foot from the body's x and y axis, m.
+pub const FOOT_OFFSET: f64 = 0.030;
 
 /// The airframe. One LiHV cell.
 pub const AIRFRAME: Airframe = Airframe {

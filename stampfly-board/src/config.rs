@@ -3,14 +3,14 @@
 //! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers
 //! them, for the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
-use crate::airframe::{AIRFRAME, DRAG, GROUND_HEIGHT, MASS};
+use crate::airframe::{AIRFRAME, DRAG, DRAG_SQUARE, DRAG_VERTICAL, FOOT_OFFSET, GROUND_HEIGHT, MASS};
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, FlipConfig, GeometricConfig, IndiConfig, MotorConfig};
 use stampfly_eskf::calibration::Corrections;
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 use stampfly_mode::failsafe::WEAK_SHARE;
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
-use stampfly_types::message_enum;
+use stampfly_types::{math, message_enum};
 
 message_enum! {
     /// Which estimator flies. The numbers are those of the parameter `estimator.type`.
@@ -35,6 +35,12 @@ message_enum! {
         Indi = 2,
     }
 }
+
+/// Share of the tilt at which the centre of mass stands above two feet, from which a vehicle that
+/// tips still falls back. It goes on turning while its motors stop: with a fifth more thrust than
+/// its weight and all its torque at 70 rad/s², for 40 ms, which is 0.05 rad and 2.7 rad/s. A foot
+/// is 0.07 s away from there as a pendulum falls, so half of 45° is left.
+const FALLS_BACK: f32 = 0.5;
 
 /// Configuration of every component of one vehicle.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +86,7 @@ impl Default for VehicleConfig {
         let ground_clearance = GROUND_HEIGHT as f32;
         let weak = AIRFRAME.rotor_torque() * WEAK_SHARE;
         let cascade = CascadeConfig::for_airframe(&AIRFRAME);
+        let flip = FlipConfig::for_airframe(&AIRFRAME);
         Self {
             estimator: EstimatorKind::default(),
             controller: ControllerKind::default(),
@@ -91,7 +98,8 @@ impl Default for VehicleConfig {
             motor: MotorConfig::for_airframe(&AIRFRAME),
             navigator: NavigatorConfig::default(),
             mode: ModeConfig {
-                flip_height: FlipConfig::for_airframe(&AIRFRAME).height_min,
+                flip_height: flip.height_min,
+                flip_room: flip.room,
                 hover_throttle: cascade.altitude.hover_thrust / cascade.altitude.thrust_max,
                 ..ModeConfig::default()
             },
@@ -99,6 +107,12 @@ impl Default for VehicleConfig {
                 weak_roll: weak.x,
                 weak_pitch: weak.y,
                 hover_thrust: AIRFRAME.hover_thrust(),
+                // Rotors at full speed turn half as fast again as in a hover.
+                drag: (1.5 * DRAG_VERTICAL / MASS) as f32,
+                drag_square: (DRAG_SQUARE / MASS) as f32,
+                inertia: AIRFRAME.inertia,
+                motor_lag: AIRFRAME.motor_lag,
+                lift_tilt: FALLS_BACK * math::atan2(FOOT_OFFSET as f32, ground_clearance),
                 // Chips, lights and radio take up to 0.4 A; a motor at a quarter of its duty takes as much again.
                 idle_current: 0.6,
                 ..FailsafeConfig::default()

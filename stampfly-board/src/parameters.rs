@@ -177,6 +177,7 @@ const HOLDERS: &[(&[&str], &[Id])] = &[
     (&["authority.stick.dead_band", "authority.pilot.back"], &[Id::command]),
     (&["authority.pilot.timeout"], &[Id::mode, Id::command]),
     (&["mode.", "authority."], &[Id::mode]),
+    (&["navigator.height.max"], &[Id::mode, Id::navigation]),
     (&["navigator."], &[Id::navigation]),
     (&["motor."], &[Id::actuation]),
     (&["button."], &[Id::button]),

@@ -63,6 +63,10 @@ pub struct ModeConfig {
     pub standing_height: f32,
     /// Least height above the surface to turn over, m. Infinite where nothing is known of the airframe: then it never does.
     pub flip_height: f32,
+    /// How far a flip rises at most, m.
+    pub flip_room: f32,
+    /// Largest height over the place of take-off, m, which a flip keeps as well.
+    pub ceiling: f32,
     /// A vehicle that is not upside down after this long does not turn over.
     pub flip_start: Duration,
     /// A flip that takes longer counts as over.
@@ -118,6 +122,8 @@ impl Default for ModeConfig {
             held_height: 0.15,
             standing_height: 0.08,
             flip_height: f32::INFINITY,
+            flip_room: 0.0,
+            ceiling: f32::INFINITY,
             // Climb and half a turn take half a second.
             flip_start: Duration::from_millis(1_200),
             // Three times what a vehicle of a palm's size needs: the sequence has time-outs of its own, this is for one that is stuck.

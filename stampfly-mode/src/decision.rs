@@ -28,7 +28,7 @@ use crate::facts::Facts;
 pub use crate::state::{CUT, LAND, NO_FLIP, Silence, State};
 use crate::transitions::{Event, is_airborne, is_armed, rows};
 use stampfly_types::messages::{
-    Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, GroundContact, Validity,
+    Alerts, ArmBlocks, ButtonGesture, CommandSource, FlightMode, FlightPhase, FlipBlocks, GroundContact, Validity,
 };
 use stampfly_types::{Duration, Instant};
 
@@ -77,6 +77,7 @@ pub(crate) fn advance(config: &ModeConfig, state: &mut State, facts: &Facts) {
     watch_pairing(config, state, facts);
     watch_height(state, facts);
     state.inverted |= facts.upright < 0.0;
+    state.lands_next = state.phase == FlightPhase::Flip && (state.lands_next || lands(config, state, facts));
     // A person has come to look at the vehicle. A press alone is no sign of it: what it becomes may be a click, which must not
     // find the crash acknowledged and arm.
     let gesture = facts.button.is_some_and(|gesture| gesture != ButtonGesture::Press);
@@ -248,28 +249,18 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             }
             FlightPhase::Landing => {
                 let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
-                low || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)
+                // What carries it cannot be felt.
+                let stands = facts.known_height().is_some_and(|height| height < config.standing_height);
+                let numb = stands && facts.alerts.contains(Alerts::FORCE_IMPLAUSIBLE);
+                low || numb || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)
             }
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Flip => false,
         },
         Event::Touchdown => facts.landed,
         Event::Land => {
-            let silent = facts.alerts.contains(Alerts::COMM_LOST);
-            let unheard = silent && (lasts(state.silence.map(|s| s.since), config.hover_without_link));
-            let unled = silent || facts.sticks == CommandSource::Failsafe;
-            let blind = lasts(state.blind, config.blind) || (state.blind.is_some() && unled);
-            let height_lost = facts.alerts.contains(Alerts::RANGE_IMPLAUSIBLE);
-            // The height of a take-off whose range lied from its beginning is known by nothing else.
-            let broken_off = phase == FlightPhase::TakeOff && (height_lost || waited(config.take_off_timeout));
-            asked.land
-                || asked.disarm
-                || pilot.switch.falls
-                || pilot.switch.found_off
-                || unheard
-                || blind
-                || lasts(state.adrift, config.adrift)
-                || broken_off
-                || facts.alerts.intersects(LAND)
+            // From upside down the thrust of a landing would push downwards.
+            let level = phase != FlightPhase::Flip || facts.upright > LEVEL || waited(config.flip_timeout);
+            level && (state.lands_next || lands(config, state, facts))
         }
         Event::TakeOffComplete => {
             facts.takeoff_complete || (state.mode.is_manual() && facts.contact == GroundContact::Air)
@@ -281,13 +272,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             let by_itself = !state.mode.is_manual() && state.takes_off && waited(config.spool);
             asked.take_off || by_itself || raised
         }
-        Event::Flip => {
-            let led = state.commander == CommandSource::Guided && !state.mode.is_manual();
-            let known = Validity::TILT.with(Validity::VELOCITY_Z).with(Validity::HEIGHT);
-            let high = facts.known_height().is_some_and(|height| height >= config.flip_height);
-            let usable = high && facts.valid.contains(known) && !facts.alerts.intersects(NO_FLIP);
-            asked.flip && led && usable && facts.upright > LEVEL && facts.at_rest
-        }
+        Event::Flip => asked.flip && flip_blocks(config, state, facts).is_empty(),
         Event::FlipOver => {
             let level = facts.upright > LEVEL && facts.at_rest;
             let given_up = !state.inverted && waited(config.flip_start);
@@ -305,6 +290,49 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
         Event::Lifted => facts.known_height().is_some_and(|height| height > config.held_height),
         Event::Ready => facts.calibrated && facts.valid.contains(Validity::TILT),
     }
+}
+
+/// Is landing asked for, or demanded?
+fn lands(config: &ModeConfig, state: &State, facts: &Facts) -> bool {
+    let (asked, pilot, phase) = (&facts.asked, &facts.pilot, state.phase);
+    let waited = |time: Duration| facts.now.since(state.entered) >= time;
+    let lasts = |since: Option<Instant>, time: Duration| since.is_some_and(|since| facts.now.since(since) >= time);
+    let silent = facts.alerts.contains(Alerts::COMM_LOST);
+    let unheard = silent && (lasts(state.silence.map(|s| s.since), config.hover_without_link));
+    let unled = silent || facts.sticks == CommandSource::Failsafe;
+    let blind = lasts(state.blind, config.blind) || (state.blind.is_some() && unled);
+    let height_lost = facts.alerts.contains(Alerts::RANGE_IMPLAUSIBLE);
+    // The height of a take-off whose range lied from its beginning is known by nothing else.
+    let broken_off = phase == FlightPhase::TakeOff && (height_lost || waited(config.take_off_timeout));
+    asked.land
+        || asked.disarm
+        || pilot.switch.falls
+        || pilot.switch.found_off
+        || unheard
+        || blind
+        || lasts(state.adrift, config.adrift)
+        || broken_off
+        || facts.alerts.intersects(LAND)
+}
+
+/// Why it would not turn over now.
+pub(crate) fn flip_blocks(config: &ModeConfig, state: &State, facts: &Facts) -> FlipBlocks {
+    if state.phase != FlightPhase::Flying {
+        return FlipBlocks::NOT_FLYING;
+    }
+    let led = state.commander == CommandSource::Guided && !state.mode.is_manual();
+    let known = Validity::TILT.with(Validity::VELOCITY_Z).with(Validity::HEIGHT).with(Validity::POSITION_Z);
+    let known = facts.valid.contains(known) && facts.known_height().is_some();
+    let high = facts.known_height().is_some_and(|height| height >= config.flip_height);
+    // A number that is none is no room.
+    let room = facts.climbed + config.flip_room <= config.ceiling;
+    FlipBlocks::NONE
+        .set(FlipBlocks::NOT_LED, !led)
+        .set(FlipBlocks::ESTIMATE, !known)
+        .set(FlipBlocks::LOW, !high)
+        .set(FlipBlocks::NO_ROOM, !room)
+        .set(FlipBlocks::UNSTEADY, !(facts.upright > LEVEL && facts.at_rest))
+        .set(FlipBlocks::ALERT, facts.alerts.intersects(NO_FLIP))
 }
 
 /// All that leaving one phase and entering another means, in one place.

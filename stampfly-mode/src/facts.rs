@@ -68,6 +68,8 @@ pub struct Facts {
     pub valid: Validity,
     /// Height above the surface, m. A number only with [`Validity::HEIGHT`].
     pub height: f32,
+    /// Height over the place of take-off, m.
+    pub climbed: f32,
     /// Tilt, rad.
     pub tilt: f32,
     /// The still-calibration is complete.
@@ -114,6 +116,7 @@ impl Facts {
             alerts: input.alerts,
             valid: input.estimate.valid,
             height: input.estimate.height,
+            climbed: -input.estimate.position.z,
             // Only the checks before arming ask for it, and an arc cosine is a tenth of a step.
             tilt: if armed { 0.0 } else { frame::tilt(&input.estimate.attitude) },
             calibrated: input.calibration.complete,

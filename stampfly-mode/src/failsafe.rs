@@ -4,15 +4,16 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, four when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
-//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, four when they may be garbage | disarmed |
+//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, in four that follow from each other when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
+//! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, in four that follow from each other when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
 //! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 20 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
-//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage, a force that neither gravity nor the thrust explains | disarmed |
+//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage for more than 50 ms; on the ground a force that is not gravity; in the air a force without a reason while the rates do not follow the torques | disarmed |
+//! | `FORCE_IMPLAUSIBLE` | in the air, a specific force that is neither near gravity nor what thrust and drag make, in the mean over 0.4 s and for a second | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
 //! | `LOW_BATTERY`, `CRITICAL_BATTERY` | low-passed voltage below 3.4 V, 3.0 V | 0.1 V higher |
@@ -33,18 +34,24 @@
 //! |---|---|
 //! | inertial sensor stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
 //! | samples that are not finite, silence | 20 ms; motors off within 25 ms |
-//! | full scale, garbage for good | 10 ms, 25 ms |
+//! | full scale, garbage for good | 10 ms, 53 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
-//! | scale of a half or less | 0.1 to 0.3 s; motors off |
-//! | range stuck at 3 cm, outliers, aliased or off by a step, frozen, ramp | 0.3 s, 0.35 s, 0.25 s, 1.5 s, 3.4 to 4.4 s |
+//! | scale of a half or less, of both | 0.8 to 1.6 s: as soon as the rates do not follow; motors off |
+//! | range stuck at 3 cm, outliers, aliased or off by a step, frozen, ramp | 0.3 s, 0.35 s, 0.25 s, 1.5 s, 3.9 to 4.9 s |
 //! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 0.7 to 3.1 s |
-//! | battery reading of nothing, or 0.35 V off | the first such reading |
+//! | battery reading of nothing, or 0.35 V off | the first such reading, the second |
+//!
+//! Two more detectors are components of their own, for vehicles that need no height to know that
+//! they have crashed: [`Following`], of whatever has a demand of its rates, and [`Resting`], of
+//! whatever lies.
 //!
 //! Numbers: `safety.*` parameters of the StampFly's reference firmware. Its recorded flights show 2–3 m/s² of
 //! vibration, peaks of 18; the six-sigma condition keeps a badly balanced propeller from looking like a crash.
 
 mod attitude;
 mod config;
+mod following;
+mod follows;
 mod force;
 mod imu;
 mod input;
@@ -52,11 +59,15 @@ mod lift;
 mod motion;
 mod motors;
 mod power;
+mod resting;
 
 pub use config::{FailsafeConfig, WEAK_SHARE};
+pub use following::{Following, FollowingConfig};
 pub use input::FailsafeInput;
+pub use resting::{Resting, RestingConfig};
 
 use attitude::AttitudeMonitor;
+use follows::FollowsMonitor;
 use force::ForceMonitor;
 use imu::ImuMonitor;
 use lift::LiftMonitor;
@@ -77,7 +88,7 @@ use stampfly_types::{Instant, Stamped};
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), thrust: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -100,6 +111,7 @@ pub struct Failsafe {
     latched_at: Instant,
     imu: ImuMonitor,
     force: ForceMonitor,
+    follows: FollowsMonitor,
     motion: MotionMonitor,
     attitude: AttitudeMonitor,
     power: PowerMonitor,
@@ -117,6 +129,7 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::MOTOR_WEAK)
     .with(Alerts::MOTOR_LOST)
     .with(Alerts::NO_LIFT)
+    .with(Alerts::FORCE_IMPLAUSIBLE)
     .with(Alerts::IMU_NOISY);
 
 impl Default for Failsafe {
@@ -142,6 +155,7 @@ impl Failsafe {
             latched_at: Instant::ZERO,
             imu: ImuMonitor::default(),
             force: ForceMonitor::default(),
+            follows: FollowsMonitor::default(),
             motion: MotionMonitor::default(),
             attitude: AttitudeMonitor::new(&config),
             power: PowerMonitor::default(),
@@ -208,16 +222,22 @@ impl Failsafe {
         // A stamp in the future must not stand for samples that never come.
         self.heard_imu = self.heard_imu.max((*at).min(now));
         let contact = Contact::expected(&self.config, input);
-        let noisy = self.active.contains(Alerts::IMU_NOISY);
-        let flips = input.flight_status.phase == FlightPhase::Flip;
-        let rate = if flips { self.config.flip_rate } else { self.config.rate };
-        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, noisy, rate);
+        let phase = input.flight_status.phase;
+        let rate = if phase == FlightPhase::Flip { self.config.flip_rate } else { self.config.rate };
+        let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, rate);
         let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
+        let mut implausible = false;
         if !suspect {
             self.attitude.add(&self.config, imu);
-            faulty |= self.force.step(&self.config, *at, imu, input, self.active.contains(Alerts::MOTOR_WEAK));
+            let follows = self.follows.step(&self.config, *at, imu, input.output);
+            let unknown = Alerts::MOTOR_WEAK | Alerts::POWER_LOST | Alerts::POWER_IMPLAUSIBLE;
+            let known = !self.active.intersects(unknown);
+            let [unexplained, lasts] = self.force.step(&self.config, *at, imu, input, known);
+            let stands = phase == FlightPhase::IdleGround;
+            faulty |= if stands { lasts } else { unexplained && !follows };
+            implausible = lasts && !stands;
         }
-        found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy)
+        found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy).set(Alerts::FORCE_IMPLAUSIBLE, implausible)
     }
 }
 

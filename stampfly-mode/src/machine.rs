@@ -5,7 +5,7 @@
 
 use crate::arming::{Refusal, Refusals};
 use crate::config::ModeConfig;
-use crate::decision::{State, advance};
+use crate::decision::{State, advance, flip_blocks};
 use crate::facts::Facts;
 pub use crate::input::{Command, ModeInput};
 use crate::pilot::Transmitter;
@@ -129,6 +129,7 @@ impl ModeMachine {
                 commander: state.commander,
                 pairing: state.pairing.is_some(),
                 blocks,
+                flip_blocks: flip_blocks(&self.config, state, &facts),
                 transitions: state.transitions,
                 control_resets: state.control_resets,
             },

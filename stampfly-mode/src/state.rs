@@ -12,8 +12,11 @@ pub const CUT: Alerts = Alerts::IMPACT
     .with(Alerts::IMU_FAULTY)
     .with(Alerts::MOTOR_LOST);
 /// Alerts that demand a landing at once.
-pub const LAND: Alerts =
-    Alerts::CRITICAL_BATTERY.with(Alerts::ESTIMATE_DIVERGED).with(Alerts::MOTOR_WEAK).with(Alerts::IMU_NOISY);
+pub const LAND: Alerts = Alerts::CRITICAL_BATTERY
+    .with(Alerts::ESTIMATE_DIVERGED)
+    .with(Alerts::MOTOR_WEAK)
+    .with(Alerts::IMU_NOISY)
+    .with(Alerts::FORCE_IMPLAUSIBLE);
 
 /// Alerts with which a vehicle does not turn over: something is wrong with what it would need for it.
 pub const NO_FLIP: Alerts = LAND
@@ -84,6 +87,8 @@ pub struct State {
     pub full_resets: u32,
     /// In this flip it has been upside down.
     pub inverted: bool,
+    /// A landing waits until this flip has ended level.
+    pub lands_next: bool,
     /// The estimate was lost in the step before.
     pub diverged: bool,
 }

@@ -18,7 +18,9 @@
 
 use crate::cockpit::Cockpit;
 use core::fmt;
-use stampfly_types::messages::{ArmBlocks, CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind};
+use stampfly_types::messages::{
+    ArmBlocks, CommandSource, FlightPhase, FlightStatus, FlipBlocks, GuidedCommand, GuidedKind,
+};
 use stampfly_types::{Duration, Instant};
 
 /// A vehicle that has not done it after this long does not. Programs send a command again after
@@ -146,15 +148,21 @@ impl Deed {
     /// Says why a vehicle in this state does not do it, as far as that is known before it is asked.
     /// `false` when nothing speaks against it.
     pub fn refuse(self, status: &FlightStatus, words: &mut dyn fmt::Write) -> bool {
-        // That a program is there, the command itself shows.
-        let blocks = status.blocks.without(ArmBlocks::NO_LINK);
-        // What is too long is cut.
-        if self == Self::Arm && !status.armed && !blocks.is_empty() {
-            _ = words.write_str("refused: ");
-            for (place, name) in blocks.names().enumerate() {
-                _ = write!(words, "{}{name}", if place > 0 { ", " } else { "" });
+        match self {
+            // That a program is there, the command itself shows.
+            Self::Arm if !status.armed => {
+                let blocks = status.blocks.without(ArmBlocks::NO_LINK);
+                if list(blocks.names(), words) {
+                    return true;
+                }
             }
-            return true;
+            Self::Flip if status.phase == FlightPhase::Flying => {
+                let blocks = status.flip_blocks.without(FlipBlocks::NOT_LED);
+                if list(blocks.names(), words) {
+                    return true;
+                }
+            }
+            _ => {}
         }
         let why = match self {
             Self::Land if !status.armed => Some("it stands on the ground"),
@@ -165,6 +173,17 @@ impl Deed {
         }
         why.is_some()
     }
+}
+
+/// Writes these reasons. `false` when there is none.
+fn list<'a>(reasons: impl Iterator<Item = &'a str>, words: &mut dyn fmt::Write) -> bool {
+    let mut some = false;
+    for name in reasons {
+        // What is too long is cut.
+        _ = write!(words, "{}{name}", if some { ", " } else { "refused: " });
+        some = true;
+    }
+    some
 }
 
 /// One that was asked for, until it is seen to have happened.

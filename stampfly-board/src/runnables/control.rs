@@ -12,6 +12,7 @@ use stampfly_control::{
     Autotune, CascadeController, ControlInput, Controller, FlipConfig, FlipController, GeometricController,
     IndiController, PidGains,
 };
+use stampfly_mode::decision::LAND;
 use stampfly_types::messages::ControlOutput;
 
 /// The controllers this vehicle can be told to use (`controller.type`).
@@ -79,6 +80,9 @@ impl Runnable for Control {
     fn run(&mut self, activation: &mut Activation, ends: &mut ControlEnds<'_>) {
         let (now, estimate, unmet) = (activation.now(), ends.estimate_state.get(), ends.actuator_motor.get().unmet);
         let phase = ends.flight_status.get().phase;
+        if ends.system_alert.get().active.intersects(LAND) {
+            self.flip.abort(now);
+        }
         if let Some(output) = self.flip.follow(now, phase, ends.setpoint.get(), estimate, unmet) {
             ends.control_output.publish(now, &output);
             return;

@@ -3,6 +3,7 @@
 use crate::config::VehicleConfig;
 use crate::topics::FailsafeEnds;
 use stampfly_bus::{Activation, Runnable};
+use stampfly_control::MotorCurve;
 use stampfly_mode::FailsafeInput;
 use stampfly_mode::transitions::is_airborne;
 use stampfly_types::messages::{CommandSource, PilotInput};
@@ -13,6 +14,7 @@ use stampfly_types::{Instant, Stamped};
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
 pub struct Failsafe {
     failsafe: stampfly_mode::Failsafe,
+    curve: MotorCurve,
     last_pilot: Option<Instant>,
     last_guided: Option<Instant>,
 }
@@ -21,7 +23,8 @@ impl Failsafe {
     /// Nothing wrong yet.
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        Self { failsafe: stampfly_mode::Failsafe::new(config.failsafe), last_pilot: None, last_guided: None }
+        let failsafe = stampfly_mode::Failsafe::new(config.failsafe);
+        Self { failsafe, curve: config.motor.curve, last_pilot: None, last_guided: None }
     }
 }
 
@@ -45,6 +48,14 @@ impl Runnable for Failsafe {
         };
         // Commands that do not get through on board are not heard, either.
         let command = heard.min(ends.command_setpoint.sample().map(|sticks| sticks.at));
+        let power = ends.sensor_power.sample();
+        // What was asked for is not what a tired battery gives.
+        let pushes = |voltage: f32| {
+            let motors = ends.actuator_motor.get();
+            let duties = motors.duty.iter().take(usize::from(motors.count));
+            duties.map(|duty| self.curve.thrust(duty * voltage)).sum::<f32>()
+        };
+        let thrust = power.map(|power| pushes(power.data.voltage)).filter(|thrust| thrust.is_finite());
 
         let alert = self.failsafe.step(
             now,
@@ -52,13 +63,14 @@ impl Runnable for Failsafe {
                 imu: &ends.sensor_imu,
                 estimate: ends.estimate_state.get(),
                 status: ends.estimate_status.get(),
-                power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
+                power: power.map(|sample| (sample.at, &sample.data)),
                 command,
                 // A distance of nothing or less is none, whatever the chip's status says: the estimator does not use it.
                 tof: usable(&ends.sensor_tof, |range| range.valid && range.distance > 0.0),
                 flow: usable(&ends.sensor_flow, |flow| flow.valid || stands),
                 baro: usable(&ends.sensor_baro, |pressure| pressure.altitude.is_finite()),
                 output: ends.control_output.get(),
+                thrust,
                 self_test: ends.self_test.get().verdict,
                 flight_status: ends.flight_status.get(),
             },

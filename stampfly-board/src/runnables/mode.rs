@@ -6,7 +6,7 @@ use crate::messages::RestartRequest;
 use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
-use stampfly_mode::{ModeInput, ModeMachine};
+use stampfly_mode::{ModeConfig, ModeInput, ModeMachine};
 use stampfly_types::messages::{ArmRefusals, ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant};
 
@@ -32,7 +32,8 @@ impl Mode {
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
         Self {
-            machine: ModeMachine::new(config.mode),
+            // Over the navigator's largest height no flip rises, either.
+            machine: ModeMachine::new(ModeConfig { ceiling: config.navigator.height_max, ..config.mode }),
             // The frames that count for the sticks count here, too.
             stale_pilot: config.authority.stale,
             pilot: None,

@@ -49,7 +49,7 @@ const HAPPENINGS: &[Happening] = &[
 
 /// Alerts that differ in what they do. Every other one does the same as the first of its line: [`merged`], shown by
 /// `alerts_of_a_kind_are_one`.
-const KINDS: [&[Alerts]; 14] = [
+const KINDS: [&[Alerts]; 15] = [
     &[Alerts::COMM_LOST],
     // Motors off, and no arming.
     &[Alerts::IMPACT, Alerts::GYRO_ANOMALY, Alerts::TUMBLED, Alerts::IMU_LOST, Alerts::IMU_FAULTY, Alerts::MOTOR_LOST],
@@ -59,6 +59,8 @@ const KINDS: [&[Alerts]; 14] = [
     &[Alerts::ESTIMATE_DIVERGED],
     // Landing at once.
     &[Alerts::MOTOR_WEAK],
+    // The same, and motors off when it stands.
+    &[Alerts::FORCE_IMPLAUSIBLE],
     // A take-off is over.
     &[Alerts::NO_LIFT],
     // A take-off is broken off, and no flip.
@@ -313,7 +315,8 @@ fn check(state: &State, facts: &Facts, next_state: &State, why: &dyn Fn() -> std
             let second = state.phase == FlightPhase::Landing && state.landing_by_switch && facts.pilot.switch.falls;
             let low = facts.known_height().is_some_and(|height| height < ModeConfig::default().stop_height);
             let stays = state.phase == FlightPhase::TakeOff && facts.alerts.contains(Alerts::NO_LIFT);
-            let lands = state.phase == FlightPhase::Landing && (facts.asked.disarm || facts.pilot.switch.falls);
+            let numb = facts.alerts.contains(Alerts::FORCE_IMPLAUSIBLE);
+            let lands = state.phase == FlightPhase::Landing && (facts.asked.disarm || facts.pilot.switch.falls || numb);
             assert!(manual || second || low && (stays || lands), "motors stopped in the air: {}", why());
             assert!(low || !next_state.unacknowledged.is_empty(), "not to be acknowledged: {}", why());
         }
@@ -368,7 +371,7 @@ fn every_state_ends_disarmed() {
 /// Turning over, from the command to the flight that goes on.
 #[test]
 fn a_flip_is_begun_and_ended_by_what_is_seen_of_it() {
-    let config = ModeConfig { flip_height: 1.0, ..ModeConfig::default() };
+    let config = ModeConfig { flip_height: 1.0, flip_room: 0.6, ceiling: 3.0, ..ModeConfig::default() };
     let flying = State {
         phase: FlightPhase::Flying,
         wanted: FlightMode::PosHold,
@@ -385,6 +388,8 @@ fn a_flip_is_begun_and_ended_by_what_is_seen_of_it() {
         Facts { alerts: Alerts::LOW_BATTERY, ..asked },
         Facts { upright: 0.9, ..asked },
         Facts { at_rest: false, ..asked },
+        Facts { climbed: 2.5, ..asked },
+        Facts { climbed: f32::NAN, ..asked },
     ] {
         assert_eq!(decide(&config, &flying, &refused).phase, FlightPhase::Flying, "{refused:?}");
     }
@@ -409,6 +414,76 @@ fn a_flip_is_begun_and_ended_by_what_is_seen_of_it() {
     assert_eq!(decide(&config, &inverted, &Facts { now: later(5_000), ..falls }).phase, FlightPhase::Flying, "stuck");
     let land = Facts { asked: Asked { land: true, any: true, ..Asked::default() }, ..falls };
     assert_eq!(decide(&config, &inverted, &land).phase, FlightPhase::Landing);
+}
+
+/// Upside down the thrust of a landing would push it down.
+#[test]
+fn a_landing_waits_until_a_flip_has_ended_level() {
+    let config = ModeConfig { flip_height: 1.0, ..ModeConfig::default() };
+    let turning = State {
+        phase: FlightPhase::Flip,
+        wanted: FlightMode::PosHold,
+        mode: FlightMode::PosHold,
+        commander: CommandSource::Guided,
+        inverted: true,
+        entered: Instant::from_secs(100),
+        ..State::default()
+    };
+    let later = |millis| Instant::from_secs(100) + Duration::from_millis(millis);
+    let leans = Facts { now: later(500), upright: -0.5, at_rest: false, ..quiet(&turning) };
+    let land = Asked { land: true, any: true, ..Asked::default() };
+    for asked in [Facts { asked: land, ..leans }, Facts { alerts: Alerts::IMU_NOISY, ..leans }] {
+        let waits = decide(&config, &turning, &asked);
+        assert!(waits.phase == FlightPhase::Flip && waits.lands_next);
+        let still = decide(&config, &waits, &Facts { now: later(600), ..leans });
+        assert_eq!(still.phase, FlightPhase::Flip);
+        let level = decide(&config, &still, &Facts { now: later(700), upright: 0.99, ..leans });
+        assert_eq!(level.phase, FlightPhase::Landing, "though it falls");
+        assert!(!decide(&config, &level, &Facts { now: later(710), ..leans }).lands_next);
+        assert_eq!(decide(&config, &still, &Facts { now: later(5_000), ..leans }).phase, FlightPhase::Landing, "stuck");
+    }
+}
+
+/// An accelerometer that lies feels no ground.
+#[test]
+fn a_landing_without_a_force_to_feel_the_ground_by_ends_where_the_vehicle_stands() {
+    let landing = State { phase: FlightPhase::Landing, landing_limit: Duration::from_secs(30), ..State::default() };
+    let next = |alerts: Alerts, height: f32, valid: Validity| {
+        let facts = Facts { alerts, height, valid, now: Instant::ZERO, ..quiet(&landing) };
+        decide(&ModeConfig::default(), &landing, &facts).phase
+    };
+    use FlightPhase::{IdleGround, Landing};
+    assert_eq!(next(Alerts::FORCE_IMPLAUSIBLE, 0.07, Validity::ALL), IdleGround);
+    assert_eq!(next(Alerts::FORCE_IMPLAUSIBLE, 0.09, Validity::ALL), Landing);
+    assert_eq!(next(Alerts::MOTOR_WEAK, 0.07, Validity::ALL), Landing);
+    assert_eq!(next(Alerts::FORCE_IMPLAUSIBLE, 0.07, Validity::TILT), Landing, "an unknown height");
+}
+
+#[test]
+fn what_speaks_against_a_flip_is_named() {
+    let config = ModeConfig { flip_height: 1.0, flip_room: 0.6, ceiling: 3.0, ..ModeConfig::default() };
+    let flying = State {
+        phase: FlightPhase::Flying,
+        mode: FlightMode::PosHold,
+        commander: CommandSource::Guided,
+        ..State::default()
+    };
+    let good = Facts { height: 1.5, climbed: 1.5, ..quiet(&flying) };
+    let blocks = |facts: Facts| flip_blocks(&config, &flying, &facts);
+    assert_eq!(blocks(good), FlipBlocks::NONE);
+    for (facts, expected) in [
+        (Facts { height: 0.9, ..good }, FlipBlocks::LOW),
+        (Facts { climbed: 2.5, ..good }, FlipBlocks::NO_ROOM),
+        (Facts { valid: Validity::ALL.without(Validity::VELOCITY_Z), ..good }, FlipBlocks::ESTIMATE),
+        (Facts { upright: 0.9, ..good }, FlipBlocks::UNSTEADY),
+        (Facts { alerts: Alerts::FLOW_IMPLAUSIBLE, ..good }, FlipBlocks::ALERT),
+    ] {
+        assert_eq!(blocks(facts), expected);
+    }
+    let piloted = State { commander: CommandSource::Pilot, ..flying };
+    assert_eq!(flip_blocks(&config, &piloted, &good), FlipBlocks::NOT_LED);
+    let lands = State { phase: FlightPhase::Landing, ..flying };
+    assert_eq!(flip_blocks(&config, &lands, &good), FlipBlocks::NOT_FLYING);
 }
 
 /// A flight that goes on is the one state without a time-out, and INIT waits for its sensors: a vehicle without them must not

@@ -24,6 +24,8 @@ pub(super) struct AttitudeMonitor {
     rest: Vec3,
     /// Specific force for the tilt on the ground.
     gravity: Option<Vec3>,
+    /// It turned over on purpose, and has not been level since.
+    turned_over: bool,
     tumbled: Option<Instant>,
     mismatch: Option<Instant>,
 }
@@ -40,6 +42,7 @@ impl AttitudeMonitor {
             rest: Vec3::z(),
             cos_mismatch: math::cos(config.tilt_mismatch),
             gravity: None,
+            turned_over: false,
             tumbled: None,
             mismatch: None,
         }
@@ -63,13 +66,21 @@ impl AttitudeMonitor {
         let known = estimate.valid.contains(Validity::TILT);
         let status = input.flight_status;
         let tips = known && self.tips(config, input, weak);
+        let level = known && frame::cos_tilt(&estimate.attitude) >= self.cos_tumble;
+        let by_acro =
+            matches!(status.phase, FlightPhase::Flying | FlightPhase::Landing) && status.mode == FlightMode::Acro;
+        let turns_over = by_acro || status.phase == FlightPhase::Flip;
+        self.turned_over = !level && (self.turned_over || turns_over);
         let limit = match (status.phase, status.mode) {
             (FlightPhase::Armed, _) => Some((self.cos_armed, config.tumble_time)),
             (FlightPhase::TakeOff, _) => Some((self.cos_tip, config.tip_time)),
             (FlightPhase::Flying | FlightPhase::Landing, FlightMode::Acro) => Some((self.cos_acro, config.acro_time)),
             // It is upside down for a third of a second, and has to come back as a pilot's loop has.
             (FlightPhase::Flip, _) => Some((self.cos_acro, config.acro_time)),
-            (FlightPhase::Flying | FlightPhase::Landing, _) => Some((self.cos_tumble, config.tumble_time)),
+            // So has one that a pilot has turned over and left to a mode that levels.
+            (FlightPhase::Flying | FlightPhase::Landing, _) => {
+                Some((self.cos_tumble, if self.turned_over { config.acro_time } else { config.tumble_time }))
+            }
             (FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld, _) => None,
         };
         let over = limit.filter(|(cos_tilt, _)| known && (frame::cos_tilt(&estimate.attitude) < *cos_tilt || tips));

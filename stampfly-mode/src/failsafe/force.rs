@@ -1,92 +1,108 @@
-//! Does the mean specific force fit what holds the vehicle?
+//! Is the specific force what thrust and drag make?
 //!
-//! On the ground that is the ground: gravity. In the air it is the thrust, and a vehicle that hovers feels gravity again. So
-//! a force is implausible when it is far from both: a pilot's loop and a fall without thrust are far from gravity only, and a
-//! vehicle that pushes against a ceiling from its thrust only.
+//! | where | what a force may be |
+//! |---|---|
+//! | on the ground | gravity |
+//! | in the air | gravity, of a vehicle that does not accelerate; or what the motors push with, less the drag of its motion |
 //!
-//! Finds an inertial sensor whose scale is wrong by a third, and thrust that is asked for and does not come. Not for less: a
-//! propeller out of balance moves the accelerometer's zero, an empty battery and the floor change the thrust.
+//! What the motors push with is what duties and battery voltage make, not what was asked for: a
+//! tired battery gives less. A force without such a reason is an error of the accelerometer, or of
+//! what is known of the vehicle. In the air the vehicle lands with it; whether it still answers to
+//! its motors, [`follows`](super::follows) says.
+//!
+//! Finds a scale that is wrong by a third or more. Not for less: a propeller out of balance moves
+//! the accelerometer's zero, and the thrust of a motor is known to some tenths.
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
+use crate::lasting::lasting;
 use core::ops::Range;
-use stampfly_types::math::{larger, smaller};
-use stampfly_types::messages::{FlightPhase, ImuData};
-use stampfly_types::{GRAVITY, Instant, Vec3};
+use stampfly_types::math::{larger, smaller, sqrt};
+use stampfly_types::messages::{FlightPhase, ImuData, Validity};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// What the force may be on the ground, of gravity.
+/// What the force may be on the ground, of gravity, and in the air, whatever the thrust.
 const STANDING: Range<f32> = 0.75..1.25;
-/// What it may be in the air, whatever the thrust.
 const FLYING: Range<f32> = 0.85..1.2;
-/// How far it may be from what the thrust makes, of the larger of that and gravity, and for the vibration's mean square, 1/(m/s²):
-/// an accelerometer that is shaken has its zero elsewhere, and four times as far when it is shaken twice as much.
-const CARRIED: f32 = 0.36;
+/// How far it may be from what thrust and drag make, of the larger of thrust and weight:
+/// coefficient of thrust 12 %, voltage curve of the motors 10 %, mass and voltage 5 % each make
+/// 0.18 together, of which this is twice.
+const SHARE: f32 = 0.36;
+/// And for the vibration's mean square, 1/(m/s²): an accelerometer that is shaken has its zero
+/// elsewhere, and four times as far when it is shaken twice as much.
 const RECTIFIED: f32 = 0.04;
-/// What it may be where that is all that is known: where it shakes by more than a mean square, (m/s²)², of three times the
-/// recorded vibration, which moves an accelerometer's zero by a third of it, or where the hover thrust is unknown.
-const SHAKEN: f32 = 120.0;
-const WIDE: Range<f32> = 0.2..2.5;
 /// Weight of a sample in the mean square.
 const SHAKEN_WEIGHT: f32 = 0.01;
-
+/// Time constant of the means, s. Thrust comes up to 0.11 s after the duty; a step of all of it,
+/// 1.7 of the weight, is then off by no more than [`SHARE`].
+const TIME: f32 = 0.4;
+/// For so long it has no reason before it counts: a gust, a hand, a fall after a crash are over by
+/// then.
+const LASTS: Duration = Duration::from_secs(1);
+/// At less than this speed there is no drag worth the name, m/s.
+const SLOW: f32 = 0.1;
 /// A step that is longer counts as this long, s.
 const LONGEST_STEP: f32 = 0.01;
-/// However large it is, it lasts this long, s: a hand that takes hold of the vehicle jerks it for 30 ms.
-const LEAST_TIME: f32 = 0.1;
-/// On the ground, so many times as much is a fault: it may be put down hard, or taken up.
-const HANDLED: f32 = 4.0;
 
-/// Means of the specific force, m/s², and of the thrust, N.
+/// Means of the specific force and of that of the thrust, m/s².
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ForceMonitor {
-    mean: Option<(Vec3, f32)>,
+    means: Option<(Vec3, f32)>,
     /// Mean square of the force about its mean.
     shaken: f32,
     last: Option<Instant>,
-    /// Speed that the unexplained part of the force has made, m/s: a cumulative sum, which no single sample resets.
-    unexplained: f32,
+    since: Option<Instant>,
 }
 
 impl ForceMonitor {
-    /// Takes a sample. Has the unexplained part of the force made a speed of `force_speed`? With a weak motor the thrust is not
-    /// what is asked for.
+    /// Takes a sample. Has the force no reason now, and has it had none for [`LASTS`]? `known`: the
+    /// motors push with what duties and voltage make.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
         at: Instant,
         imu: &ImuData,
         input: &FailsafeInput<'_>,
-        weak: bool,
-    ) -> bool {
+        known: bool,
+    ) -> [bool; 2] {
         let dt = self.last.replace(at).map_or(0.0, |last| smaller(at.since(last).seconds(), LONGEST_STEP));
-        let (force, thrust) = self.mean.get_or_insert((imu.accel, input.output.thrust));
-        let off = imu.accel - *force;
+        let thrust = input.thrust.filter(|_| config.hover_thrust.is_finite() && known);
+        let pushed = thrust.map(|thrust| thrust * (GRAVITY / config.hover_thrust));
+        let (force, thrust) = self.means.get_or_insert((imu.accel, pushed.unwrap_or_default()));
+        let (off, share) = (imu.accel - *force, dt / (TIME + dt));
         self.shaken += (off.norm_squared() - self.shaken) * SHAKEN_WEIGHT;
-        *force += off * config.force_weight;
-        *thrust += (input.output.thrust - *thrust) * config.force_weight;
-        let (size, thrust) = (force.norm(), *thrust);
-        let beyond = |range: &Range<f32>| larger(range.start * GRAVITY - size, size - range.end * GRAVITY);
-        let (excess, limit) = match input.flight_status.phase {
-            FlightPhase::IdleGround => (beyond(&STANDING), HANDLED * config.force_speed),
-            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
-                let known = config.hover_thrust.is_finite() && !weak;
-                let range = if known && self.shaken < SHAKEN { &FLYING } else { &WIDE };
-                let unlike_thrust = if known {
-                    let carried = thrust * (GRAVITY / config.hover_thrust);
-                    let range = CARRIED * larger(carried, GRAVITY) + RECTIFIED * self.shaken;
-                    (size - carried).abs() - range
-                } else if input.flight_status.mode.is_manual() && input.flight_status.phase != FlightPhase::Landing {
-                    // It may be falling with its motors at rest. What lands by itself has none at rest.
-                    -GRAVITY
-                } else {
-                    GRAVITY
-                };
-                (smaller(beyond(range), unlike_thrust), config.force_speed)
-            }
-            FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => (-GRAVITY, config.force_speed),
+        *force += off * share;
+        *thrust += (pushed.unwrap_or_default() - *thrust) * share;
+        let (force, thrust) = (*force, *thrust);
+        let outside = |range: &Range<f32>| {
+            let square = force.norm_squared() / (GRAVITY * GRAVITY);
+            square < range.start * range.start || square > range.end * range.end
         };
-        self.unexplained = larger(self.unexplained + smaller(excess, limit / LEAST_TIME) * dt, 0.0);
-        self.unexplained > limit
+        let unexplained = match input.flight_status.phase {
+            FlightPhase::IdleGround => outside(&STANDING),
+            FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing | FlightPhase::Flip => {
+                let known = pushed.is_some() && input.estimate.valid.contains(Validity::VELOCITY_Z);
+                let limit = SHARE * larger(thrust, GRAVITY) + RECTIFIED * self.shaken;
+                known && outside(&FLYING) && Self::unexplained(config, input, force, thrust) > limit * limit
+            }
+            FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => false,
+        };
+        [unexplained, lasting(&mut self.since, at, unexplained) >= LASTS]
+    }
+
+    /// Square of what is left of the force without thrust and drag, (m/s²)². Any drag up to the
+    /// largest is a reason, since nothing measures the wind.
+    fn unexplained(config: &FailsafeConfig, input: &FailsafeInput<'_>, force: Vec3, thrust: f32) -> f32 {
+        let left = force + Vec3::new(0.0, 0.0, thrust);
+        let velocity = input.estimate.attitude.inverse_transform_vector(&input.estimate.velocity);
+        let speed = sqrt(velocity.norm_squared());
+        if speed < SLOW {
+            return left.norm_squared();
+        }
+        let most = (config.drag + config.drag_square * speed) * speed;
+        let against = velocity * (-1.0 / speed);
+        let drag = smaller(larger(left.dot(&against), 0.0), most);
+        (left - against * drag).norm_squared()
     }
 }

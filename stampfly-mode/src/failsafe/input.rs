@@ -26,6 +26,9 @@ pub struct FailsafeInput<'a> {
     pub baro: Option<Instant>,
     /// What the controller asked for one step ago.
     pub output: &'a ControlOutput,
+    /// What the motors push with together, as their duties and the battery's voltage make it, N;
+    /// `None` where that is not known.
+    pub thrust: Option<f32>,
     /// How the self test at power-on ended.
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.

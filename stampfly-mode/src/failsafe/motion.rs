@@ -1,35 +1,36 @@
 //! Impact and excess rate, and which samples to believe about them.
 //!
-//! A blow shows in two samples running, and two samples of garbage (a shifted frame, a register of `0x8000`) look like
-//! a blow. What tells them apart is that a burst ends where it began. A sample is *suspect* when [`ImuData::is_garbled`] says so.
-//! Up to `garbled_samples` suspect samples running are set aside, three times as many of a noisy sensor. One more, and it was
-//! no burst: all of them count. A blow that looks like garbage is therefore seen two samples later than any other, unless it is
-//! *hard*: the forces of two samples come from one side, and do not repeat each other.
+//! A blow shows in two samples running, and two samples of garbage (a shifted frame, a register of
+//! `0x8000`) look like a blow. What tells them apart is that a burst ends where it began. A sample
+//! is *suspect* when [`ImuData::is_garbled`] says so. Suspect samples are set aside. A blow turns
+//! the vehicle to another rate, and there the samples *follow* from each other as a body moves:
+//! when `garbled_samples` of them do and one more, all of them count. Garbage does not follow from
+//! garbage; for how long a vehicle may fly on with it, [`imu`](super::imu) says. A blow that looks
+//! like garbage is therefore seen two samples later than any other, unless it is *hard*: the forces
+//! of two samples come from one side, and do not repeat each other.
 //!
 //! | evidence | motors off after |
 //! |---|---|
 //! | rate, or force over some 10 ms, above its limit in two believed samples running | the second sample |
-//! | the same in two of four suspect samples running | the fourth sample |
+//! | the same in two of four suspect samples running that follow from each other | the fourth sample |
 //! | force over some 10 ms above its limit in this sample, at the end of a hard blow, suspect or not | the second sample |
 //! | a *sharp* blow, outside a touch-down: the [peak](ImuData::accel_peak) of the chip's own samples is no vibration | the first sample |
-//! | up to three suspect samples, then the motion of before | never |
+//! | suspect samples that do not follow from each other, or three that do | never |
 
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use stampfly_types::messages::{Alerts, FlightPhase, ImuData, Validity};
-use stampfly_types::{GRAVITY, Instant, Vec3, math};
+use stampfly_types::{Duration, GRAVITY, Instant, Vec3, math};
 
-/// A burst of a noisy sensor is this many times as long: of one sample in five, four come together every two seconds.
-const NOISY_BURST: u32 = 3;
 /// Forces of two samples come from one side when the cosine between them is as large: 25°. Of two random ones 5 % are.
 const ONE_SIDE: f32 = 0.9;
 /// A hard blow changes the rate by up to so many times what makes a sample suspect. A wall at 1.5 m/s does 1.8 times.
 const SPIN: f32 = 2.0;
 
-/// A sharp blow has a peak of so much, m/s², and lies so many standard deviations above the mean of the peaks before it: more of
-/// them along the vertical, in which thrust pushes and propellers shake. In 3,000 flights in gusts at twice the recorded vibration the largest
-/// of the peaks that passed the first limit were 6.8 and 8.2 deviations.
-const SHARP: f32 = 4.0 * GRAVITY;
+/// A sharp blow has a peak of [`sharp`](FailsafeConfig::sharp), and lies so many standard
+/// deviations above the mean of the peaks before it: more of them along the vertical, in which
+/// thrust pushes and propellers shake. In 3,000 flights in gusts at twice the recorded vibration
+/// the largest of the peaks that passed the first limit were 6.8 and 8.2 deviations.
 const SHARP_SIGMAS: f32 = 7.5;
 const UPRIGHT_SIGMAS: f32 = 10.0;
 /// Peaks enter these statistics in full up to this, m/s², and above it up to so many deviations: a blow must not raise its own limit.
@@ -128,6 +129,9 @@ impl Evidence {
     }
 }
 
+/// How long ago the sample before was taken, and its rate.
+type Before = Option<(Duration, Vec3)>;
+
 /// What is remembered of the motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -135,7 +139,9 @@ pub(super) struct MotionMonitor {
     believed: Evidence,
     /// With the suspect samples that are running.
     suspected: Evidence,
-    suspects: u32,
+    suspects: bool,
+    /// How many of them follow from each other, the last included.
+    following: u32,
     /// The last rate that was believed.
     rate: Option<(Instant, Vec3)>,
     /// The rate of the sample before, believed or not.
@@ -149,15 +155,14 @@ pub(super) struct MotionMonitor {
 }
 
 impl MotionMonitor {
-    /// Takes a finite sample: what it shows, and whether it is suspect. `noisy`: suspect samples are frequent; `rate`: no vehicle
-    /// that is under control turns faster, rad/s.
+    /// Takes a finite sample: what it shows, and whether it is suspect. `rate`: no vehicle that is
+    /// under control turns faster, rad/s.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
         at: Instant,
         imu: &ImuData,
         contact: Contact,
-        noisy: bool,
         rate: f32,
     ) -> (Alerts, bool) {
         let impact = if contact == Contact::Landing { config.landing_impact } else { config.impact };
@@ -165,18 +170,21 @@ impl MotionMonitor {
         let before = self.rate.map(|(last, rate)| (at.since(last), rate));
         let suspect = imu.is_garbled(before, config.angular_acceleration, config.accel_full_scale);
         let limits = Limits { contact, force: limit, rate };
-        let sharp = self.is_sharp(config, at, imu, contact);
-        let hard = self.ends_hard_blow(config, at, imu, &limits);
+        let turned = self.turned.replace((at, imu.gyro)).map(|(last, rate)| (at.since(last), rate));
+        let sharp = self.is_sharp(config, turned, imu, contact);
+        let hard = self.ends_hard_blow(config, turned, imu, &limits);
         if suspect {
-            if self.suspects == 0 {
-                self.suspected = self.believed;
+            if !self.suspects {
+                (self.suspects, self.suspected, self.following) = (true, self.believed, 0);
             }
-            self.suspects = self.suspects.saturating_add(1);
+            let follows = !imu.is_garbled(turned, config.angular_acceleration, config.accel_full_scale);
+            self.following = if follows { self.following.saturating_add(1) } else { 1 };
             self.suspected.add(config, imu, &limits, false, hard);
             // What is allowed to the next sample must not grow with a burst.
             self.rate = self.rate.map(|(_, rate)| (at, rate));
-            let burst = if noisy { NOISY_BURST * config.garbled_samples } else { config.garbled_samples };
-            if self.suspects <= burst && !sharp && !(hard && self.suspected.alerts(config).contains(Alerts::IMPACT)) {
+            let goes_on = self.following > config.garbled_samples;
+            let struck = sharp || (hard && self.suspected.alerts(config).contains(Alerts::IMPACT));
+            if !(goes_on || struck) {
                 return (Alerts::NONE, true);
             }
             self.believed = self.suspected;
@@ -188,7 +196,7 @@ impl MotionMonitor {
             let weight = config.vibration_weight;
             self.force = [mean + weight * off, variance + weight * (off * off - variance)];
         }
-        self.suspects = 0;
+        self.suspects = false;
         self.rate = Some((at, imu.gyro));
         let found = self.believed.alerts(config);
         (if sharp { found.with(Alerts::IMPACT) } else { found }, suspect)
@@ -196,12 +204,12 @@ impl MotionMonitor {
 
     /// Does a sharp blow begin in this sample? Where the ground may push, nothing is one: its push is as sharp. Nor does one come from
     /// above: a vehicle that climbs against a ceiling comes down on its motors.
-    fn is_sharp(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, contact: Contact) -> bool {
+    fn is_sharp(&mut self, config: &FailsafeConfig, turned: Before, imu: &ImuData, contact: Contact) -> bool {
         let peak = imu.accel_peak;
         let [x, y, z] = [imu.accel.x, imu.accel.y, imu.accel.z];
         let upright = z * z > x * x + y * y;
         let sigmas = if upright { UPRIGHT_SIGMAS } else { SHARP_SIGMAS };
-        let mut limit = SHARP;
+        let mut limit = config.sharp;
         for ([mean, variance], weight) in self.peaks.iter_mut().zip(SHARP_WEIGHTS) {
             let mut off = peak - *mean;
             if peak >= CALM {
@@ -213,17 +221,15 @@ impl MotionMonitor {
             *mean += weight * off;
             *variance += weight * (off * off - *variance);
         }
-        let before = self.turned.map(|(last, rate)| (at.since(last), rate));
         contact == Contact::None
             && !(upright && z > 0.0)
             && (limit..f32::MAX).contains(&peak)
-            && !imu.is_garbled(before, SPIN * config.angular_acceleration, config.accel_full_scale)
+            && !imu.is_garbled(turned, SPIN * config.angular_acceleration, config.accel_full_scale)
     }
 
     /// Are this sample and the one before a hard blow?
-    fn ends_hard_blow(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, limits: &Limits) -> bool {
-        let before = self.turned.replace((at, imu.gyro)).map(|(last, rate)| (at.since(last), rate));
-        let garbled = || imu.is_garbled(before, SPIN * config.angular_acceleration, config.accel_full_scale);
+    fn ends_hard_blow(&mut self, config: &FailsafeConfig, turned: Before, imu: &ImuData, limits: &Limits) -> bool {
+        let garbled = || imu.is_garbled(turned, SPIN * config.angular_acceleration, config.accel_full_scale);
         let force = limits.contact.felt(&imu.accel);
         let struck = (force.norm_squared() >= limits.force * limits.force && !garbled()).then_some(force);
         let before = core::mem::replace(&mut self.struck, struck);

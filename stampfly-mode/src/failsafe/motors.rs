@@ -1,9 +1,12 @@
 //! A motor or a propeller that has become weak.
 //!
-//! Its thrust is missed on one corner, so the controller asks for torque about roll and pitch at once, and keeps asking. A gust or
-//! a manoeuvre asks for as much for a moment, a shifted load about one axis. A battery that lies askew asks for it from the
-//! take-off on: so what has become so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a rotor's share of the weight on, what has
-//! been so from [`STANDING`] times that on. A vehicle on the ground says nothing, because what holds it looks the same.
+//! Its thrust is missed on one corner, so the controller asks for torque about roll and pitch at
+//! once, and keeps asking. A gust or a manoeuvre asks for as much for a moment, a shifted load
+//! about one axis. A battery that lies askew asks for it from the take-off on: so what has become
+//! so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a rotor's share of the weight on, what has
+//! been so from [`STANDING`] times that on. Half a propeller that was broken before looks like a
+//! battery that lies askew, and is trimmed as one. A vehicle on the ground says nothing, because
+//! what holds it looks the same.
 //!
 //! With half of a rotor's thrust a vehicle lands. A controller that asks for more than one rotor's whole share about both axes
 //! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost. It shows at
@@ -19,8 +22,10 @@ use stampfly_types::{Duration, Instant};
 const WEIGHT: f32 = 0.05;
 /// The same for what is usual: 3 s, which a weakness of a tenth of a second does not move.
 const USUAL: f32 = 0.0008;
-/// What is usual may be this many times as large as what becomes so.
-const STANDING: f32 = 1.5;
+/// What is usual may be this many times as large as what becomes so: two thirds of a rotor's share
+/// of the weight. A centre of mass that lies a sixth of the rotors' distance aside, about both
+/// axes, asks for as much: 3.8 mm of a StampFly's 23.
+const STANDING: f32 = 2.2;
 /// A motor is lost from this many times a weak one's torque on: a rotor's share of the weight.
 const LOST: f32 = 1.0 / WEAK_SHARE;
 

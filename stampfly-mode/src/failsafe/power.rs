@@ -1,9 +1,12 @@
 //! The battery: its level, its monitor's silence, and readings that no battery gives.
 //!
-//! While armed, a reading is implausible when it is not finite, outside `voltage_range`, or farther from the last
-//! plausible one than `voltage_step`, `voltage_rate` times the time since, and what the change of the current makes of
-//! `resistance` explain together. It then counts for nothing else. Disarmed everything is plausible: batteries are
-//! changed, and a board runs on USB. But what draws more than `idle_current` then is a motor.
+//! While armed, a reading is implausible when it is not finite, outside `voltage_range`, or farther
+//! from the last plausible one than `voltage_step`, `voltage_rate` times the time since, and what the
+//! change of the current makes of `resistance` explain together. It then counts for nothing else.
+//! One that is merely too far is told by the next one: a monitor gives the mean of the current, which
+//! comes a reading later than the voltage that it lets fall. Disarmed everything is plausible:
+//! batteries are changed, and a board runs on USB. But what draws more than `idle_current` then is a
+//! motor.
 
 use super::config::FailsafeConfig;
 use stampfly_types::Instant;
@@ -22,6 +25,8 @@ pub(super) struct PowerMonitor {
     newest: Option<Instant>,
     finite: Option<Instant>,
     plausible: Option<(Instant, f32, f32)>,
+    /// The newest reading was too far from that one.
+    far: bool,
     /// Low-passed, A, while disarmed.
     current: Option<(Instant, f32)>,
 }
@@ -65,9 +70,14 @@ impl PowerMonitor {
         if no_meter && (!armed || self.voltage.is_none()) {
             return active;
         }
-        let plausible = !armed || self.is_plausible(config, at, power);
+        let [low, high] = config.voltage_range;
+        let none = armed && !(low..=high).contains(&power.voltage);
+        let far = armed && !none && !self.is_explained(config, at, power);
+        let again = core::mem::replace(&mut self.far, far) && far;
+        let plausible = !none && !far;
+        let known = active.contains(Alerts::POWER_IMPLAUSIBLE);
         let active = active
-            .set(Alerts::POWER_IMPLAUSIBLE, !plausible)
+            .set(Alerts::POWER_IMPLAUSIBLE, none || again || (far && known))
             .set(Alerts::MOTOR_RUNS, self.draws(config, at, power, armed));
         if !plausible {
             return active;
@@ -100,13 +110,12 @@ impl PowerMonitor {
         current > config.idle_current
     }
 
-    fn is_plausible(&self, config: &FailsafeConfig, at: Instant, power: &PowerData) -> bool {
-        let [low, high] = config.voltage_range;
-        let Some((last, voltage, current)) = self.plausible else { return (low..=high).contains(&power.voltage) };
+    /// Is it as far from the last plausible reading as a battery goes?
+    fn is_explained(&self, config: &FailsafeConfig, at: Instant, power: &PowerData) -> bool {
+        let Some((last, voltage, current)) = self.plausible else { return true };
         let free = config.voltage_step + config.voltage_rate * at.since(last).seconds();
         // A current that is no number explains nothing.
         let drop = config.resistance * Some(power.current - current).filter(|rise| rise.is_finite()).unwrap_or(0.0);
-        let [least, most] = [voltage - free - drop.max(0.0), voltage + free - drop.min(0.0)];
-        (low.max(least)..=high.min(most)).contains(&power.voltage)
+        (voltage - free - drop.max(0.0)..=voltage + free - drop.min(0.0)).contains(&power.voltage)
     }
 }

@@ -1,6 +1,7 @@
 //! What the failsafe finds and what it does not.
 
 mod battery;
+mod follows;
 mod force;
 mod inertial;
 mod lift;
@@ -27,6 +28,7 @@ struct Rig {
     status: EstimatorStatus,
     battery: PowerData,
     output: ControlOutput,
+    thrust: Option<f32>,
     noise: u32,
 }
 
@@ -42,6 +44,7 @@ impl Rig {
             status: EstimatorStatus::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },
             output: ControlOutput::default(),
+            thrust: None,
             noise: 1,
         }
     }
@@ -88,6 +91,7 @@ impl Rig {
             flow: Some(now),
             baro: Some(now),
             output: &self.output,
+            thrust: self.thrust,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &self.mode,
         };
@@ -191,6 +195,7 @@ fn the_battery_warns_before_it_lands() {
             flow: Some(at),
             baro: Some(at),
             output: &ControlOutput::default(),
+            thrust: None,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &mode,
         };
@@ -219,6 +224,7 @@ fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Opti
         flow: Some(now),
         baro: Some(now),
         output: &ControlOutput::default(),
+        thrust: None,
         self_test: SelfTestVerdict::NotRun,
         flight_status: &FlightStatus::default(),
     };
@@ -272,6 +278,7 @@ fn a_failed_self_test_is_an_alert_for_good() {
             flow: None,
             baro: None,
             output: &ControlOutput::default(),
+            thrust: None,
             self_test,
             flight_status: mode,
         };
@@ -304,6 +311,7 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
                     flow,
                     baro,
                     output: &ControlOutput::default(),
+                    thrust: None,
                     self_test: SelfTestVerdict::NotRun,
                     flight_status: &mode,
                 };
@@ -336,7 +344,7 @@ fn a_motor_that_becomes_weak_is_found_and_a_load_that_lies_askew_is_not() {
     assert!(!is_weak([0.0, 0.0], [4.0, 0.5], 400), "about one axis");
     assert!(!is_weak([0.9, 0.9], [1.2, 1.2], 400), "askew all the time");
     assert!(is_weak([0.4, 0.4], [-1.4, 1.6], 80), "beyond what is usual");
-    assert!(is_weak([1.7, 1.7], [1.7, 1.7], 10), "weak from the take-off on");
+    assert!(is_weak([2.4, 2.4], [2.4, 2.4], 10), "weak from the take-off on");
 }
 
 /// What stands leans on the ground, and a landing is what would follow.

@@ -32,6 +32,6 @@ pub use sensor::{
     AirspeedData, BaroData, ExternalPose, FlowData, GnssData, GnssFix, ImuData, MagData, PowerData, TofData,
 };
 pub use system::{
-    Alerts, ArmBlocks, ArmRefusals, CommandSource, FlightMode, FlightPhase, FlightStatus, GroundContact, LandDetected,
-    SelfTest, SelfTestVerdict, Signal, SystemAlert, Tone,
+    Alerts, ArmBlocks, ArmRefusals, CommandSource, FlightMode, FlightPhase, FlightStatus, FlipBlocks, GroundContact,
+    LandDetected, SelfTest, SelfTestVerdict, Signal, SystemAlert, Tone,
 };

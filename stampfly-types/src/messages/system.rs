@@ -122,6 +122,26 @@ message! {
     }
 }
 
+message_flags! {
+    /// Why the vehicle will not turn over. Empty means it will.
+    pub struct FlipBlocks {
+        /// It does not fly.
+        NOT_FLYING = 0,
+        /// No program flies it, or in a mode whose throttle is thrust.
+        NOT_LED = 1,
+        /// Tilt, height or climb rate are unknown.
+        ESTIMATE = 2,
+        /// Too low to brake the fall.
+        LOW = 3,
+        /// Too near to the largest height that it may fly at.
+        NO_ROOM = 4,
+        /// It leans, turns, climbs or sinks.
+        UNSTEADY = 5,
+        /// Battery low, link lost, or something wrong with what it would need.
+        ALERT = 6,
+    }
+}
+
 message_enum! {
     /// Who has authority over the set-point.
     pub enum CommandSource {
@@ -152,6 +172,8 @@ message! {
         pairing: bool,
         /// Why arming would be refused right now.
         blocks: ArmBlocks,
+        /// Why a flip would be refused right now.
+        flip_blocks: FlipBlocks,
         /// Transitions since power-on.
         transitions: u32,
         /// A change of this number resets the controller.
@@ -215,6 +237,9 @@ message_flags! {
         MOTOR_RUNS = 24,
         /// The thrust that is asked for does not lift the vehicle off the ground: motors off.
         NO_LIFT = 25,
+        /// The specific force is not what thrust and drag make, and the vehicle answers to its
+        /// motors.
+        FORCE_IMPLAUSIBLE = 26,
     }
 }
 

@@ -139,7 +139,11 @@ impl Invariants {
         let abandoned = self.comm_lost_since.is_some_and(|since| at.since(since) >= self.hover_without_link);
         let lands = abandoned
             || active.intersects(
-                Alerts::CRITICAL_BATTERY | Alerts::ESTIMATE_DIVERGED | Alerts::MOTOR_WEAK | Alerts::IMU_NOISY,
+                Alerts::CRITICAL_BATTERY
+                    | Alerts::ESTIMATE_DIVERGED
+                    | Alerts::MOTOR_WEAK
+                    | Alerts::IMU_NOISY
+                    | Alerts::FORCE_IMPLAUSIBLE,
             );
         self.must_be_off = (lands && self.motors_on).then(|| {
             self.must_be_off.unwrap_or(at + LAND_WITHIN + Duration::from_seconds(self.clearance.max(0.0) / LAND_RATE))

@@ -65,16 +65,16 @@ fn a_motor_that_becomes_weak_while_it_lands_is_not_told_and_not_dropped() {
 
 /// What the controller asks for all the time is usual, and a battery may lie askew; but not so far.
 #[test]
-fn a_torque_that_was_asked_for_from_the_ground_on_is_a_weak_motor_from_half_as_much_again_on() {
+fn a_torque_that_was_asked_for_from_the_ground_on_is_a_weak_motor_from_more_than_twice_as_much_on() {
     let weak = |torque: [f32; 2]| {
         let mut rig = rig(FlightPhase::Armed, 0.03);
         assert_eq!(found(&mut rig, torque, 400, Alerts::MOTOR_WEAK), None, "it stands");
         (rig.mode.phase, rig.estimate.height) = (FlightPhase::Flying, 1.0);
         found(&mut rig, torque, 400, Alerts::MOTOR_WEAK)
     };
-    assert_eq!(weak([1.6, -1.6]), Some(41), "after 0.1 s");
-    assert_eq!(weak([1.4, 1.4]), None);
-    assert_eq!(weak([3.0, 1.4]), None, "about one axis");
+    assert_eq!(weak([2.3, -2.3]), Some(41), "after 0.1 s");
+    assert_eq!(weak([2.1, 2.1]), None);
+    assert_eq!(weak([3.0, 2.1]), None, "about one axis");
 }
 
 /// Samples until a motor counts as running, of so many; bursts of a sample ten times a second add to the current, A.

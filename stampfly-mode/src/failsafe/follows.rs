@@ -1,0 +1,84 @@
+//! Do the measured rates follow the commanded torques?
+//!
+//! Torque over inertia, through the lag of the motors, is the angular acceleration that the
+//! controller makes. What it adds to the rate within [`CHANGE`] is compared with what the gyro
+//! says, both less their mean over [`MEAN`], since a load that lies askew asks for torque all the
+//! time. The share of the one in the other, by least squares over [`OVER`], is one; inertia and
+//! thrust of a specimen make 0.6 to 1.4 of it. Where it is less than a third, the rates are not
+//! those of the body, or the body does not answer to its motors, and nothing keeps it level.
+//!
+//! It is asked only where the torque makes more than noise and vibration do. Not for a judgement of
+//! its own: torque that holds off a gust, or pushes against a hand or the ground, makes no rate
+//! either.
+
+use super::config::FailsafeConfig;
+use stampfly_types::messages::{ControlOutput, ImuData};
+use stampfly_types::{Instant, math};
+
+/// Time constants of changes, of their mean, and of the sums, s.
+const CHANGE: f32 = 0.1;
+const MEAN: f32 = 0.5;
+const OVER: f32 = 0.3;
+/// Change of the rate that the torque has to make in the root mean square, rad/s: ten times what
+/// vibration makes of the torque.
+const ASKED: f32 = 1.0;
+/// Share of it that has to be measured.
+const FOLLOWS: f32 = 0.3;
+/// A step that is longer counts as this long, s.
+const LONGEST_STEP: f32 = 0.01;
+
+/// What is remembered of torques and rates about roll and pitch.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct FollowsMonitor {
+    last: Option<Instant>,
+    axes: [Axis; 2],
+    /// Means of the square of what the torque makes, and of its product with what is measured,
+    /// (rad/s)².
+    asked: f32,
+    answered: f32,
+}
+
+/// One axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Axis {
+    /// Torque as the motors make it, N·m, and the last rate, rad/s.
+    torque: f32,
+    rate: f32,
+    /// Changes of the rate within [`CHANGE`], made and measured, and their means, rad/s.
+    changes: [f32; 2],
+    means: [f32; 2],
+}
+
+impl FollowsMonitor {
+    /// Takes a sample beside what was asked for. Do the rates follow?
+    pub(super) fn step(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, asked: &ControlOutput) -> bool {
+        let dt = self.last.replace(at).map_or(0.0, |last| math::smaller(at.since(last).seconds(), LONGEST_STEP));
+        let (torque, inertia) = (asked.torque.to_array(), config.inertia.to_array());
+        let [mut square, mut product] = [0.0; 2];
+        for (place, (axis, rate)) in self.axes.iter_mut().zip(imu.gyro.to_array()).enumerate() {
+            let [made, measured] = axis.step(torque[place], inertia[place], config.motor_lag, rate, dt);
+            square += made * made;
+            product += made * measured;
+        }
+        let share = dt / (OVER + dt);
+        self.asked += (square - self.asked) * share;
+        self.answered += (product - self.answered) * share;
+        self.asked < ASKED * ASKED || self.answered > FOLLOWS * self.asked
+    }
+}
+
+impl Axis {
+    /// The changes of the rate, less their means: what the torque makes, and what is measured.
+    fn step(&mut self, torque: f32, inertia: f32, lag: f32, rate: f32, dt: f32) -> [f32; 2] {
+        self.torque += (torque - self.torque) * (dt / (lag + dt));
+        let last = core::mem::replace(&mut self.rate, rate);
+        let steps = [self.torque / inertia * dt, if dt > 0.0 { rate - last } else { 0.0 }];
+        for ((change, mean), step) in self.changes.iter_mut().zip(&mut self.means).zip(steps) {
+            *change = (*change + step) * (CHANGE / (CHANGE + dt));
+            *mean += (*change - *mean) * (dt / (MEAN + dt));
+        }
+        core::array::from_fn(|place| self.changes[place] - self.means[place])
+    }
+}
