@@ -3,6 +3,8 @@
 //! Airspeeds are true ones in m/s, heights in m above the strip, angles in rad, times in s. The default is the Ultra Stick 25e of the University of Minnesota, a
 //! model of 1.96 kg and 1.27 m of span, on a grass strip 16 m wide. For another aircraft begin with its stall: rotation lies a fifth above it or more, cruise two thirds.
 
+use crate::crash::CrashConfig;
+
 /// An aircraft's numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,6 +21,8 @@ pub struct Config {
     pub ground: Ground,
     /// When something is wrong.
     pub limits: Limits,
+    /// What is a crash.
+    pub crash: CrashConfig,
 }
 
 /// Airspeeds, m/s.

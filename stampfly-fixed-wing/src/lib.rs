@@ -7,12 +7,15 @@
 //! | [`modes`] | take-off, cruising, landing and taxiing with their stages, and which follows which | inside the path manager |
 //! | [`orders`] | what is wanted, by whom, and where to | inside the path manager |
 //! | [`watch`] | what is wrong: detects, never acts | 50 Hz |
+//! | [`crash`], [`heights`] | whether it has crashed, and whether its height is one | inside the watch |
 //! | [`config`] | an aircraft's speeds, heights and limits | |
 //! | [`messages`] | what travels between them and the rest of a vehicle | |
 //! | [`status()`] | the same state in the words that links, pages and missions read | |
 #![no_std]
 
 pub mod config;
+pub mod crash;
+pub mod heights;
 pub mod messages;
 pub mod modes;
 pub mod orders;

@@ -34,6 +34,24 @@ message_flags! {
         BATTERY = 4,
         /// Its attitude is not known: nothing can be flown.
         ATTITUDE = 5,
+        /// It has crashed.
+        CRASH = 6,
+        /// Its height contradicts what measures it.
+        HEIGHT = 7,
+    }
+}
+
+message! {
+    /// Heights that are measured, and that no estimator has a part in.
+    pub struct MeasuredHeights {
+        /// Above home, by the air's pressure.
+        barometer: f32 ["m"],
+        /// When; zero is never.
+        barometer_at: Instant ["us"],
+        /// Above home, by the satellite receiver.
+        receiver: f32 ["m"],
+        /// When; zero is never.
+        receiver_at: Instant ["us"],
     }
 }
 
@@ -116,6 +134,16 @@ message! {
         refused: u32,
         /// When somebody was last heard; zero is never.
         heard: Instant ["us"],
+    }
+}
+
+impl MeasuredHeights {
+    /// Of barometer and receiver, with their times.
+    #[must_use]
+    pub fn both(&self) -> [Option<(Instant, f32)>; 2] {
+        let Self { barometer, barometer_at, receiver, receiver_at } = *self;
+        [(barometer_at, barometer), (receiver_at, receiver)]
+            .map(|(at, height)| (at > Instant::ZERO && height.is_finite()).then_some((at, height)))
     }
 }
 

@@ -8,6 +8,8 @@
 //! | mode executor | the one call, [`Selector::execute`] |
 //! | coordinate turn, elevation | hands the demand to the autopilot, which flies it at its own rate |
 //! | fatal failure | entered when anything fails or a demand would be no number, never left: throttle closed, a gentle turn, a glide |
+//!
+//! A crash disarms in every one of them.
 
 use crate::Config;
 use crate::messages::*;
@@ -82,6 +84,8 @@ pub struct PathManager {
     settled: f32,
     parked: f32,
     failed: Option<Instant>,
+    /// It has crashed, and nobody has disarmed it since.
+    crashed: bool,
     last: Option<Instant>,
     /// Take-offs that were given up, as far as orders know.
     given_up: u32,
@@ -107,15 +111,14 @@ impl PathManager {
         let (unknown, calm) = (StateEstimate::default(), AirState::default());
         let estimate = if is_finite(sensed.estimate) { sensed.estimate } else { &unknown };
         let sensed = &Sensed { estimate, air: if is_finite(sensed.air) { sensed.air } else { &calm }, ..*sensed };
+        self.note_crash(sensed);
         self.state = match self.state {
-            State::CommsWithAttitude if sensed.safety.troubles.contains(Troubles::ATTITUDE) && self.orders.armed => {
-                State::FatalFailure
-            }
+            State::CommsWithAttitude if is_lost(sensed.safety) && self.orders.armed => State::FatalFailure,
             State::CommsWithAttitude => State::CommsWithTelemetry,
             State::CommsWithTelemetry => {
                 let circumstances = Circumstances {
                     position: position(sensed.estimate),
-                    may_arm: Self::blocks(sensed).is_empty(),
+                    may_arm: self.blocks(sensed).is_empty(),
                     on_ground: self.settled > SETTLED,
                 };
                 sensed.commands.iter().for_each(|command| self.orders.obey(command, &circumstances));
@@ -178,20 +181,33 @@ impl PathManager {
 
     /// Why it would not arm.
     #[must_use]
-    pub fn blocks(sensed: &Sensed<'_>) -> ArmBlocks {
+    pub fn blocks(&self, sensed: &Sensed<'_>) -> ArmBlocks {
         let Sensed { estimate, home, safety, .. } = sensed;
         let is_placed =
             home.known && estimate.valid.contains(Validity::TILT | Validity::VELOCITY_Z | Validity::POSITION_Z);
         // One that knows where north is knows where it is, or has no receiver any more; the heading alone comes with the roll.
         let is_lost = estimate.valid.contains(Validity::HEADING) && position(estimate).is_none();
         [
-            (ArmBlocks::ESTIMATE, !is_placed || is_lost),
+            (ArmBlocks::ESTIMATE, !is_placed || is_lost || safety.troubles.contains(Troubles::HEIGHT)),
+            (ArmBlocks::CRASHED, self.crashed || safety.troubles.contains(Troubles::CRASH)),
             (ArmBlocks::ATTITUDE, safety.troubles.contains(Troubles::ATTITUDE)),
             (ArmBlocks::LOW_BATTERY, safety.troubles.contains(Troubles::BATTERY)),
             (ArmBlocks::SENSOR, safety.troubles.contains(Troubles::AIRSPEED)),
         ]
         .iter()
         .fold(ArmBlocks::NONE, |all, (block, holds)| all.set(*block, *holds))
+    }
+
+    /// One that has crashed is disarmed in whatever it does. Somebody who disarms it has looked at
+    /// it.
+    fn note_crash(&mut self, sensed: &Sensed<'_>) {
+        if sensed.safety.troubles.contains(Troubles::CRASH) {
+            self.crashed |= self.orders.armed;
+            self.orders.disarm();
+            self.orders.failsafe = false;
+        } else if sensed.commands.iter().any(|command| command.kind == GuidedKind::Disarm) {
+            self.crashed = false;
+        }
     }
 
     /// Notices the strip, and that it stands.
@@ -260,6 +276,11 @@ impl PathManager {
             _ => State::FatalFailure,
         }
     }
+}
+
+/// Is there nothing to fly by?
+fn is_lost(safety: &Safety) -> bool {
+    safety.troubles.contains(Troubles::ATTITUDE) || safety.troubles.contains(Troubles::HEIGHT)
 }
 
 fn position(estimate: &StateEstimate) -> Option<[f32; 2]> {

@@ -37,7 +37,7 @@ pub fn status(manager: &PathManager, sensed: &Sensed<'_>) -> FlightStatus {
             (true, true) => CommandSource::Failsafe,
             (true, false) => CommandSource::Guided,
         },
-        blocks: PathManager::blocks(sensed),
+        blocks: manager.blocks(sensed),
         ..FlightStatus::default()
     }
 }

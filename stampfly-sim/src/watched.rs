@@ -36,10 +36,20 @@ pub struct Shown {
     pub moves: bool,
     /// It sinks, in order to land.
     pub lands: bool,
+    /// Its motors are told to turn.
+    pub turns: bool,
+    /// In how many steps something has touched the ground that does not carry it there, as
+    /// [`Body::scrapes`](crate::plant::Body::scrapes) counts them.
+    pub scrapes: u64,
+    /// How far it is from where it is to be, m.
+    pub beside: f64,
 }
 
 /// What one kind of vehicle measures of its flights.
 pub trait Measured {
+    /// Farther than this from where it is to be, m, it has flown away. By default it never has.
+    const AWAY: f64 = f64::INFINITY;
+
     /// Was the mission flown with larger errors than a flight without faults has?
     fn is_degraded(&self) -> bool;
 
@@ -96,6 +106,10 @@ pub struct Watched<M> {
     pub by_sticks: bool,
     /// Speed at the hardest touch after flight, m/s: a bounce does not make it a soft one.
     pub touchdown: f32,
+    /// The crash, if there was one.
+    pub crash: Option<Crash>,
+    /// Farthest from where it was to be while it was armed, m.
+    pub farthest: f64,
     /// Largest tilt, rad.
     pub tilt: f32,
     /// At the end.
@@ -108,8 +122,24 @@ pub struct Watched<M> {
     pub measured: M,
     /// When it left the ground for the first time.
     left: Option<Instant>,
-    /// It touched the ground at the last look.
+    /// It touched the ground at the last look, this fast if it does.
     touched: bool,
+    speed: f32,
+    scrapes: u64,
+    is_armed: bool,
+}
+
+/// A crash: the first one of a flight, unless the motors had stopped in the air before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crash {
+    /// When.
+    pub at: Instant,
+    /// Speed at the touch, m/s.
+    pub speed: f32,
+    /// Something touched that does not carry it: no wheel and no foot.
+    pub scraped: bool,
+    /// How long its motors were still told to turn, the last time that they were.
+    pub turned: Duration,
 }
 
 /// Somebody beside the field: looks at the truth at regular times, writes it down, and sees when a flight is over.
@@ -177,6 +207,7 @@ impl Spectator {
 #[derive(Debug, Serialize)]
 struct Findings {
     outcome: &'static str,
+    reason: String,
     expected: &'static str,
     as_expected: bool,
     violations: Vec<&'static str>,
@@ -194,17 +225,24 @@ impl<M: Measured + Default> Watched<M> {
 impl<M: Measured> Watched<M> {
     /// Looks at the truth and at what the vehicle shows, and tells the injector which moments have come.
     pub fn look(&mut self, now: Instant, shown: &Shown, truth: &Truth, injector: &Injector) {
-        let Shown { ready, armed, height, stays, moves, lands } = *shown;
+        let Shown { ready, armed, height, stays, moves, lands, turns, scrapes, beside } = *shown;
         let is_clear = height > CLEAR;
         self.armed |= armed;
+        self.is_armed = armed;
         if armed && is_clear {
             self.left.get_or_insert(now);
         }
         self.cut |= !armed && is_clear && self.has_flown();
         let touches = truth.contact && !self.touched && self.has_flown() && !is_clear && !stays;
-        self.touched = truth.contact;
+        // The ground slows it down within a look.
+        let speed = self.speed.max(M::touch(truth));
+        self.look_for_crash(now, truth, speed, scrapes, turns);
+        (self.touched, self.speed) = (truth.contact, M::touch(truth));
         if touches {
-            self.touchdown = self.touchdown.max(M::touch(truth));
+            self.touchdown = self.touchdown.max(speed);
+        }
+        if armed {
+            self.farthest = self.farthest.max(beside);
         }
         self.tilt = self.tilt.max(frame::tilt(&truth.attitude));
         let flies = self.left.is_some_and(|left| now.since(left) >= FLOWN);
@@ -220,6 +258,26 @@ impl<M: Measured> Watched<M> {
         for (moment, _) in moments.iter().filter(|(_, has_come)| *has_come) {
             injector.reached(*moment, now);
         }
+    }
+
+    fn look_for_crash(&mut self, now: Instant, truth: &Truth, speed: f32, scrapes: u64, turns: bool) {
+        // What tips over when its motors stand already, and slowly, breaks nothing.
+        let scraped = scrapes > self.scrapes && self.armed && (turns || truth.velocity.norm() > HARD);
+        let hit = truth.contact && !self.touched && self.has_flown() && speed > HARD;
+        self.scrapes = scrapes;
+        if (scraped || hit) && !self.cut {
+            self.crash.get_or_insert(Crash { at: now, speed, scraped, turned: Duration::ZERO });
+        }
+        if let Some(crash) = self.crash.as_mut().filter(|_| turns) {
+            crash.turned = now.since(crash.at);
+        }
+    }
+
+    /// Is nothing more to come of it, because it has crashed or was stopped in the air, and is
+    /// disarmed?
+    #[must_use]
+    pub const fn is_out(&self) -> bool {
+        self.cut || self.crash.is_some() && !self.is_armed
     }
 
     /// The flight is over: with these faults, of which the injector knows what each has changed. What people break on purpose is not judged.
@@ -248,8 +306,12 @@ impl<M: Measured> Watched<M> {
     pub fn class(&self) -> Class {
         if !self.armed {
             Class::Refused
+        } else if self.farthest > M::AWAY {
+            Class::FlownAway
         } else if !self.disarmed {
             Class::KeptOn
+        } else if self.crash.is_some() {
+            Class::Crashed
         } else if self.cut {
             Class::Cut
         } else if !self.stands() || self.touchdown > HARD {
@@ -260,6 +322,36 @@ impl<M: Measured> Watched<M> {
             Class::Degraded
         } else {
             Class::Transparent
+        }
+    }
+
+    /// Why it is no better end: a sentence without a capital letter, empty when the mission was
+    /// flown as if nothing had happened.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        let crashed = self.crash.map(|crash| {
+            let Crash { speed, scraped, turned, .. } = crash;
+            let what =
+                if scraped { "something touched the ground that does not carry it" } else { "it touched the ground" };
+            format!("{what}, at {speed:.1} m/s; its motors turned for {:.2} s more", turned.seconds_f64())
+        });
+        let tilt = frame::tilt(&self.last.attitude).to_degrees();
+        match self.class() {
+            Class::Refused => "it was never armed".into(),
+            Class::FlownAway => format!("{:.0} m from where it was to be", self.farthest),
+            Class::KeptOn => match crashed {
+                Some(crashed) => format!("armed at the end; {crashed}"),
+                None => "armed at the end".into(),
+            },
+            Class::Cut => "its motors stopped in the air".into(),
+            Class::Crashed => match crashed {
+                Some(crashed) => crashed,
+                None if self.touchdown > HARD => format!("it touched the ground at {:.1} m/s", self.touchdown),
+                None => format!("it lies at {tilt:.0}\u{b0}"),
+            },
+            Class::Landed => "it landed before the mission was over".into(),
+            Class::Degraded => "its errors were larger than without a fault".into(),
+            Class::Transparent => String::new(),
         }
     }
 
@@ -287,6 +379,7 @@ impl<M: Measured> Verdict for Watched<M> {
         let acted = self.faults.iter().all(|(_, changes)| *changes > 0);
         Findings {
             outcome: self.class().name(),
+            reason: self.reason(),
             expected: self.worst().name(),
             as_expected: self.succeeded(),
             violations: if acted { Vec::new() } else { vec![FAULT_ACTED] },
@@ -307,6 +400,8 @@ impl<M: Measured> Verdict for Watched<M> {
         let mut figures = self.measured.figures();
         figures.push(Figure { name: "touchdown_speed_mps", unit: "m/s", value: Some(self.touchdown.into()) });
         figures.push(Figure { name: "largest_tilt_deg", unit: "deg", value: Some(f64::from(self.tilt).to_degrees()) });
+        let turned = self.crash.map(|crash| crash.turned.seconds_f64());
+        figures.push(Figure { name: "motors_off_after_crash_s", unit: "s", value: turned });
         figures
     }
 
@@ -321,12 +416,13 @@ impl<M: Measured> Verdict for Watched<M> {
         if self.live {
             return "flown by other programs".into();
         }
+        let reason = self.reason();
         match (self.expected, self.succeeded()) {
             (None, true) if self.by_sticks => format!("flown to the end of its sticks: {}", self.class()),
             (None, true) => "landed and disarmed".into(),
-            (None, false) => format!("FAILED: {}", self.class()),
+            (None, false) => format!("{}: {reason}", self.class().name().to_uppercase()),
             (Some(_), true) => format!("{}, as expected", self.class()),
-            (Some(worst), false) => format!("{}, NOT ACCEPTABLE: {worst} at worst", self.class()),
+            (Some(worst), false) => format!("{}, NOT ACCEPTABLE: {worst} at worst; {reason}", self.class()),
         }
     }
 }
@@ -367,6 +463,85 @@ mod tests {
     fn a_bounce_does_not_make_a_hard_touch_a_soft_one() {
         assert_eq!(flown(&[(0.0, 0.0), (2.0, 1.0), (0.0, 1.0), (0.0, 0.0)]), Class::Transparent);
         assert_eq!(flown(&[(0.0, 0.0), (2.0, 9.0), (0.0, 9.0), (1.0, 0.5), (0.0, 0.5)]), Class::Crashed);
+    }
+
+    /// One that hits the ground at the third look, and whose motors turn until it is disarmed at
+    /// this one.
+    fn crashed(disarmed: u64) -> Watched<Nothing> {
+        let (mut watched, injector) = (Watched::<Nothing>::new(0), Injector::new(Instant::ZERO, &[]));
+        let mut last = Truth::default();
+        for look in 1..=9 {
+            let height = if look < 3 { 2.0 } else { 0.0 };
+            last =
+                Truth { velocity: Vec3::new(0.0, 0.0, if look < 3 { 4.0 } else { 0.0 }), contact: look >= 3, ..last };
+            let armed = look < disarmed;
+            let shown = Shown { armed, turns: armed, height, ..Shown::default() };
+            watched.look(Instant::from_secs(look), &shown, &last, &injector);
+            assert_eq!(watched.is_out(), look >= 3 && !armed, "look {look}");
+        }
+        watched.finished = true;
+        watched.end(&[], None, last, disarmed > 9);
+        watched
+    }
+
+    #[test]
+    fn a_crash_is_one_and_says_how_long_the_motors_turned() {
+        let watched = crashed(5);
+        assert_eq!((watched.class(), watched.succeeded()), (Class::Crashed, false));
+        assert!(watched.sentence().starts_with("CRASHED: it touched the ground, at 4.0 m/s"), "{}", watched.sentence());
+        let figure =
+            |name: &str| watched.figures().into_iter().find(|figure| figure.name == name).map(|found| found.value);
+        assert_eq!(figure("motors_off_after_crash_s"), Some(Some(1.0)));
+        let watched = crashed(20);
+        assert_eq!(watched.class(), Class::KeptOn);
+        assert!(watched.reason().contains("armed at the end; it touched the ground"), "{}", watched.reason());
+    }
+
+    #[test]
+    fn a_part_that_carries_nothing_is_a_crash_and_what_was_stopped_in_the_air_is_none() {
+        let injector = Injector::new(Instant::ZERO, &[]);
+        let flown = |cut: bool, scrapes: u64| {
+            let (mut watched, standing) = (Watched::<Nothing>::new(0), Truth { contact: true, ..Truth::default() });
+            let looks = [(true, 0.0, 0), (true, 2.0, 0), (!cut, 2.0, 0), (!cut, 0.0, scrapes), (false, 0.0, scrapes)];
+            for (second, (armed, height, scrapes)) in (1..).zip(looks) {
+                let truth = Truth { contact: height == 0.0, ..standing };
+                let shown = Shown { armed, turns: armed, height, scrapes, ..Shown::default() };
+                watched.look(Instant::from_secs(second), &shown, &truth, &injector);
+            }
+            watched.finished = true;
+            watched.end(&[], None, standing, false);
+            watched.class()
+        };
+        assert_eq!(flown(false, 0), Class::Transparent);
+        assert_eq!(flown(false, 3), Class::Crashed);
+        assert_eq!(flown(true, 3), Class::Cut);
+    }
+
+    #[derive(Default)]
+    struct Tethered;
+
+    impl Measured for Tethered {
+        const AWAY: f64 = 10.0;
+
+        fn is_degraded(&self) -> bool {
+            false
+        }
+
+        fn figures(&self) -> Vec<Figure> {
+            Vec::new()
+        }
+    }
+
+    #[test]
+    fn what_is_far_from_where_it_was_to_be_has_flown_away() {
+        let mut watched = Watched::<Tethered>::new(0);
+        let injector = Injector::new(Instant::ZERO, &[]);
+        for (second, armed, beside) in [(1, true, 2.0), (2, true, 12.0), (3, false, 50.0)] {
+            let shown = Shown { armed, beside, ..Shown::default() };
+            watched.look(Instant::from_secs(second), &shown, &Truth::default(), &injector);
+        }
+        watched.end(&[], None, Truth { contact: true, ..Truth::default() }, false);
+        assert_eq!((watched.class(), watched.reason().as_str()), (Class::FlownAway, "12 m from where it was to be"));
     }
 
     #[test]

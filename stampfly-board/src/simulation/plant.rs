@@ -1,8 +1,8 @@
 //! The StampFly as a simulated body: what its [airframe](crate::airframe) does not say, and the two together.
 
 use crate::airframe::{
-    AIRFRAME, DRAG, GROUND_HEIGHT, INERTIA, MASS, MOTOR_VOLTAGE, ROTOR_INERTIA, ROTOR_OFFSET, THRUST_COEFFICIENT,
-    TORQUE_COEFFICIENT,
+    AIRFRAME, DRAG, DRAG_SQUARE, DRAG_VERTICAL, FOOT_OFFSET, GROUND_HEIGHT, INERTIA, MASS, MOTOR_VOLTAGE,
+    ROTOR_INERTIA, ROTOR_OFFSET, THRUST_COEFFICIENT, TORQUE_COEFFICIENT,
 };
 use stampfly_sim::plant::PlantParameters;
 
@@ -26,11 +26,11 @@ pub const PLANT: PlantParameters = PlantParameters {
     // Gives a lag of 20 ms at hover.
     rotor_inertia: ROTOR_INERTIA,
     manufacturing_spread: 1.0,
+    centre_x: 0.0,
+    centre_y: 0.0,
     drag_horizontal: DRAG,
-    // 1.4 1/s of damping, from theory.
-    drag_vertical: 0.0515,
-    // A flat plate of its size.
-    drag_quadratic: 0.004,
+    drag_vertical: DRAG_VERTICAL,
+    drag_quadratic: DRAG_SQUARE,
     drag_rotation: 1.0e-6,
     battery_cells: AIRFRAME.cells as f64,
     // The label.
@@ -41,13 +41,15 @@ pub const PLANT: PlantParameters = PlantParameters {
     battery_time_constant: 10.0,
     board_current: 0.15,
     ground_height: GROUND_HEIGHT,
-    foot_offset: 0.030,
+    foot_offset: FOOT_OFFSET,
     foot_stiffness: 700.0,
     foot_damping: 2.0,
     foot_friction: 0.6,
     // Half extents of the product.
     corner_offset: 0.0408,
     corner_height: 0.0103,
+    // They turn inside of the frame's extents.
+    propeller_radius: 0.0,
     ground_effect_gain: 0.10,
     ground_effect_height: 0.05,
 };

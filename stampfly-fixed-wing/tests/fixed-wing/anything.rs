@@ -111,7 +111,17 @@ proptest! {
             now += stampfly_fixed_wing::types::Duration::from_millis(period.milliseconds);
             let power = PowerData { voltage: period.voltage, ..PowerData::default() };
             let Period { estimate, air, home, commands, edits, .. } = period;
-            let watched = Watched { estimate: Some(estimate), air, power: Some(&power), heard: Some(now), config: &config };
+            let watched = Watched {
+                estimate: Some(estimate),
+                air,
+                power: Some(&power),
+                heard: Some(now),
+                heights: [Some((now, estimate.velocity.x)), None],
+                place: manager.status().place,
+                armed: manager.is_armed(),
+                blow: false,
+                config: &config,
+            };
             let found = watch.step(now, &watched);
             let safety = Safety { troubles: period.troubles.unwrap_or(found.troubles), ..found };
             let sensed = Sensed { estimate, air, home, safety: &safety, config: &config, commands, edits };

@@ -158,6 +158,40 @@ fn an_attitude_that_is_lost_while_armed_is_a_failure_for_ever() {
 }
 
 #[test]
+fn what_has_crashed_is_disarmed_in_any_state_and_armed_after_somebody_has_disarmed_it() {
+    for lost in [Troubles::NONE, Troubles::ATTITUDE, Troubles::HEIGHT] {
+        let mut desk = Desk::flying();
+        desk.safety.troubles = lost;
+        desk.cycles(0.1);
+        assert_eq!(desk.manager.status().cycle == CycleStatus::FailureMode, !lost.is_empty(), "{lost:?}");
+        assert!(desk.manager.is_armed());
+        desk.safety.troubles = lost | Troubles::CRASH;
+        desk.cycles(0.02);
+        assert!(!desk.manager.is_armed(), "{lost:?}");
+    }
+    let mut desk = Desk::flying();
+    desk.safety.troubles = Troubles::CRASH;
+    desk.cycles(1.0);
+    // It lies upright now, somewhere.
+    (desk.safety.troubles, desk.air.airspeed, desk.estimate.velocity) = (Troubles::NONE, 0.0, Vec3::zeros());
+    desk.cycles(5.0);
+    desk.command(GuidedKind::Arm);
+    assert!(!desk.manager.is_armed(), "nobody has looked at it");
+    desk.command(GuidedKind::Disarm);
+    desk.command(GuidedKind::Arm);
+    assert!(desk.manager.is_armed());
+
+    let mut carried = Desk::new();
+    carried.safety.troubles = Troubles::CRASH;
+    carried.cycles(1.0);
+    carried.command(GuidedKind::Arm);
+    assert!(!carried.manager.is_armed(), "it lies");
+    carried.safety.troubles = Troubles::NONE;
+    carried.command(GuidedKind::Arm);
+    assert!(carried.manager.is_armed(), "and stands again");
+}
+
+#[test]
 fn an_armed_aircraft_that_stands_and_hears_nobody_is_disarmed() {
     let mut desk = Desk::new();
     desk.cycles(0.1);

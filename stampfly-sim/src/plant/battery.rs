@@ -1,10 +1,12 @@
 //! Lithium cells of the high-voltage kind, in series.
 //!
-//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that acts slowly. Temperature and ageing change
-//! these: `wear.rs`.
+//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that
+//! acts slowly. Temperature and ageing change these: `wear.rs`.
 //!
-//! Battery and motors are one circuit: the voltage of the one is the current of the others. [`Battery::under`] solves it as it is; a loop that takes the voltage of the
-//! step before swings from step to step as soon as the resistance times the motors' conductance exceeds one, 0.21 Ω for a StampFly.
+//! Battery and motors are one circuit: the voltage of the one is the current of the others.
+//! [`Battery::under`] solves it as it is; a loop that takes the voltage of the step before swings
+//! from step to step as soon as the resistance times the motors' conductance exceeds one, 0.21 Ω
+//! for a StampFly.
 
 /// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge (typical discharge curve at rest).
 const OPEN_CIRCUIT: [f64; 11] = [3.20, 3.58, 3.67, 3.72, 3.76, 3.81, 3.88, 3.97, 4.08, 4.20, 4.35];
@@ -32,7 +34,8 @@ impl BatterySpec {
         Self { cells: 1.0, charge: 1.0, capacity: 1.0, resistance: 0.02, polarisation: 0.01, time_constant: 10.0 };
 }
 
-/// Something that draws the more current, the more voltage there is, and nothing below some voltage: a motor that turns.
+/// Something that draws the more current, the more voltage there is, and nothing below some
+/// voltage: a motor that turns.
 ///
 /// ```
 /// use stampfly_sim::plant::{Battery, BatterySpec, Load};
@@ -125,12 +128,14 @@ impl Battery {
         battery
     }
 
-    /// The terminal voltage at which these loads, and what always draws `idle` amperes, take what the battery gives, V.
+    /// The terminal voltage at which these loads, and what always draws `idle` amperes, take what
+    /// the battery gives, V.
     #[must_use]
     pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
         let source = self.open_circuit() - self.polarisation - self.resistance * idle;
         let mut voltage = source;
-        // Linear for the loads that draw. Without one that does not the voltage is lower, so that none comes back: no more passes than loads.
+        // Linear for the loads that draw. Without one that does not the voltage is lower, so that
+        // none comes back: no more passes than loads.
         for _ in 0..=loads.len() {
             let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
             let (conductance, back) =

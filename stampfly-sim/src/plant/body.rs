@@ -86,6 +86,12 @@ pub trait Body: Any + fmt::Debug {
         true
     }
 
+    /// In how many steps something has touched the ground that does not carry the vehicle there: a
+    /// propeller, a wing tip. By default none.
+    fn scrapes(&self) -> u64 {
+        0
+    }
+
     /// Rotor speed in usual flight, rad/s. By default 1: what has no rotors must not divide by nothing.
     fn nominal_rotor_speed(&self) -> f64 {
         1.0
@@ -180,6 +186,10 @@ impl Body for Plant {
 
     fn contact(&self) -> bool {
         self.ground().contact()
+    }
+
+    fn scrapes(&self) -> u64 {
+        self.ground().scrapes()
     }
 
     fn nominal_rotor_speed(&self) -> f64 {

@@ -2,8 +2,10 @@
 //!
 //! Each point is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's
 //! limit along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
+//!
+//! Propellers without a frame around them touch the floor, too. That stops them, and bears nothing.
 
-use super::{DT, PlantParameters, Scene};
+use super::{DT, PlantParameters, ROTORS, Scene};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Feet and corners, in units of their offset (x, y).
@@ -11,6 +13,7 @@ const SIDES: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.
 
 /// Points that can touch: feet first, then corners.
 const POINTS: usize = 8;
+const FEET: usize = 4;
 
 /// The floor as the vehicle feels it.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +23,11 @@ pub struct Ground {
     points: [Vector3<f64>; POINTS],
     /// Steps in which a ceiling or a wall pushed.
     strikes: u64,
+    /// Steps in which a corner or a propeller touched the floor.
+    scrapes: u64,
+    /// Middles of the propellers, and their radius; none that can touch with a radius of 0.
+    hubs: [Vector3<f64>; ROTORS],
+    radius: f64,
     /// Distance of the farthest point from the origin.
     reach: f64,
     stiffness: f64,
@@ -36,12 +44,18 @@ impl Ground {
         let points: [Vector3<f64>; POINTS] = core::array::from_fn(|i| {
             let (x, y) = SIDES[i % 4];
             let (offset, down) =
-                if i < 4 { (p.foot_offset, p.ground_height + sink) } else { (p.corner_offset, -p.corner_height) };
-            Vector3::new(x * offset, y * offset, down)
+                if i < FEET { (p.foot_offset, p.ground_height + sink) } else { (p.corner_offset, -p.corner_height) };
+            Vector3::new(x * offset - p.centre_x, y * offset - p.centre_y, down)
+        });
+        let hubs = SIDES.map(|(x, y)| {
+            Vector3::new(x * p.rotor_offset - p.centre_x, y * p.rotor_offset - p.centre_y, -p.corner_height)
         });
         Self {
             anchors: [None; POINTS],
             strikes: 0,
+            scrapes: 0,
+            hubs,
+            radius: p.propeller_radius,
             points,
             reach: points.iter().map(Vector3::norm).fold(0.0, f64::max),
             stiffness: p.foot_stiffness,
@@ -62,6 +76,39 @@ impl Ground {
     #[must_use]
     pub fn strikes(&self) -> u64 {
         self.strikes
+    }
+
+    /// In how many steps a corner or a propeller has touched the floor.
+    #[must_use]
+    pub fn scrapes(&self) -> u64 {
+        self.scrapes
+    }
+
+    /// Which propellers touch the floor, in motor order.
+    pub(crate) fn held(
+        &mut self,
+        position: &Vector3<f64>,
+        attitude: &UnitQuaternion<f64>,
+        scene: &Scene,
+    ) -> [bool; ROTORS] {
+        let corners = self.anchors.iter().skip(FEET).any(Option::is_some);
+        let is_high = scene.slope == [0.0; 2] && -position.z - scene.highest() > self.hubs[0].norm() + self.radius;
+        let is_free = self.radius <= 0.0 || is_high;
+        if is_free {
+            self.scrapes += u64::from(corners);
+            return [false; ROTORS];
+        }
+        let axis = attitude * Vector3::z();
+        // From the hub to the lowest place of a tilted disc.
+        let down = Vector3::z() - axis * axis.z;
+        let length = down.norm();
+        let lowest = if length > 1e-6 { down * (self.radius / length) } else { Vector3::zeros() };
+        let held = self.hubs.map(|hub| {
+            let place = position + attitude * hub + lowest;
+            place.z > scene.floor(&place)
+        });
+        self.scrapes += u64::from(corners || held.contains(&true));
+        held
     }
 
     /// Factor on the thrust of rotors at `height` metres above the floor.

@@ -165,8 +165,9 @@ impl Plant {
         if let Some(air) = &self.air {
             lift *= air.lift(m, &self.scene);
         }
+        let held = self.ground.held(&m.position, &m.attitude, &self.scene);
         let voltage = self.battery.under(p.board_current, &self.rotors.loads());
-        let loads = self.rotors.step(DT, voltage, lift);
+        let loads = self.rotors.step(DT, voltage, lift, held);
         let current = loads.current + p.board_current;
         self.battery.step(DT, current);
 

@@ -8,6 +8,8 @@
 //! thrust   T = Ct·ω²
 //! ```
 //!
+//! A propeller that touches something stands: no thrust, and the current of a motor that is held.
+//!
 //! `Km`, `Dm` and `Qf` are not parameters of their own: the steady voltage curve V(ω) = Am·ω² + Bm·ω + Cm that was
 //! measured fixes them for a given resistance (set dω/dt = 0 and compare powers of ω). The winding's inductance
 //! is left out, its time constant being some ten microseconds.
@@ -28,6 +30,10 @@ pub(super) const PLACES: [(f64, f64); ROTORS] = [(1.0, 1.0), (-1.0, 1.0), (-1.0,
 
 /// Which way they turn about the body's z axis (down): −1 is counter-clockwise seen from above.
 const SPINS: [f64; ROTORS] = [-1.0, 1.0, -1.0, 1.0];
+
+/// Time constant with which a propeller that touches something stops, s: a turn of one of five
+/// inches takes 6 ms at hover.
+const STOPS: f64 = 0.002;
 
 /// What the rotors do to the body in one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,7 +95,8 @@ impl Rotors {
             p.thrust_coefficient * (1.0 + conditions.rotor_spread * spread * noise.normal().clamp(-limit, limit))
         });
         let across = conditions.centre_spread * spread;
-        let centre = within(limit * across, [across * noise.normal(), across * noise.normal()]);
+        let differs = within(limit * across, [across * noise.normal(), across * noise.normal()]);
+        let centre = [p.centre_x + differs[0], p.centre_y + differs[1]];
         let motors = &mut Noise::stream(seed, Stream::RotorSpecimen);
         let mut differing = |mean: f64| {
             [(); ROTORS]
@@ -164,8 +171,9 @@ impl Rotors {
         core::array::from_fn(|i| Load::of_motor(duty[i], self.resistance[i], self.motor_constant[i] * self.speed[i]))
     }
 
-    /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`.
-    pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64) -> RotorLoads {
+    /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`. `held`: whose
+    /// propeller touches something.
+    pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64, held: [bool; ROTORS]) -> RotorLoads {
         // Each line for all rotors, so that they are computed side by side.
         let duty = self.switched();
         let speed = self.speed;
@@ -177,16 +185,21 @@ impl Rotors {
             let net = self.motor_constant[i] * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
             (speed[i] + net / self.inertia * dt).max(0.0)
         });
-        let reaction: [f64; ROTORS] = core::array::from_fn(|i| {
+        let mut reaction: [f64; ROTORS] = core::array::from_fn(|i| {
             let acceleration = (self.speed[i] - speed[i]) / dt;
             -SPINS[i] * (drag[i] + self.inertia * acceleration)
         });
-        let thrust: [f64; ROTORS] =
+        let mut thrust: [f64; ROTORS] =
             core::array::from_fn(|i| self.thrust_coefficient[i] * self.faults[i].thrust * speed[i] * speed[i] * lift);
-        let thrust = match &mut self.lag {
+        thrust = match &mut self.lag {
             Some(lag) => lag.pass(thrust),
             None => thrust,
         };
+        for i in (0..ROTORS).filter(|i| held[*i]) {
+            // What stops it pushes outside of the body, which feels the motor alone.
+            self.speed[i] = speed[i] * (1.0 - dt / STOPS).max(0.0);
+            (thrust[i], reaction[i]) = (0.0, -SPINS[i] * self.motor_constant[i] * current[i]);
+        }
         let mut loads = RotorLoads::default();
         for i in 0..ROTORS {
             let (x, y) = self.places[i];
@@ -210,6 +223,7 @@ mod tests {
     use super::*;
 
     const IDEAL: PlantParameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
+    const FREE: [bool; ROTORS] = [false; ROTORS];
 
     fn ideal() -> Rotors {
         Rotors::new(&IDEAL, &Conditions::GENTLE, 0)
@@ -221,7 +235,7 @@ mod tests {
             let mut rotors = ideal();
             rotors.set_fault(1, fault);
             rotors.set_duty([duty; ROTORS]);
-            let loads = (0..1600).map(|_| rotors.step(625e-6, 4.0, 1.0)).last().expect("steps");
+            let loads = (0..1600).map(|_| rotors.step(625e-6, 4.0, 1.0, FREE)).last().expect("steps");
             (rotors.speed(), loads)
         };
         let (healthy, all) = settled(RotorFault::NONE, 0.6);
@@ -277,7 +291,7 @@ mod tests {
         rotors.set_duty([0.62; 4]);
         let before = settle(&mut rotors, 4.15).thrust;
         rotors.set_duty([0.64; 4]);
-        let trace: Vec<_> = (0..1600).map(|_| rotors.step(DT, 4.15, 1.0).thrust - before).collect();
+        let trace: Vec<_> = (0..1600).map(|_| rotors.step(DT, 4.15, 1.0, FREE).thrust - before).collect();
         let goal = trace[1599] * (1.0 - (-1f64).exp());
         let lag = trace.iter().filter(|gain| **gain < goal).count() as f64 * DT;
         assert!((0.1..0.125).contains(&lag), "the rotors' 20 ms and 90: {lag} s");
@@ -291,7 +305,7 @@ mod tests {
     fn settle(rotors: &mut Rotors, voltage: f64) -> RotorLoads {
         let mut loads = RotorLoads::default();
         for _ in 0..1600 {
-            loads = rotors.step(1.0 / 1600.0, voltage, 1.0);
+            loads = rotors.step(1.0 / 1600.0, voltage, 1.0, FREE);
         }
         loads
     }
@@ -334,7 +348,7 @@ mod tests {
         rotors.set_duty([0.63; 4]);
         let mut trace = Vec::new();
         for _ in 0..320 {
-            rotors.step(1.0 / 1600.0, 4.15, 1.0);
+            rotors.step(1.0 / 1600.0, 4.15, 1.0, FREE);
             trace.push(rotors.speed()[0] - before);
         }
         let goal = trace[319] * (1.0 - (-1f64).exp());
@@ -357,12 +371,29 @@ mod tests {
     }
 
     #[test]
+    fn a_propeller_that_is_held_stands_and_its_motor_takes_the_current_of_a_stall() {
+        let mut rotors = ideal();
+        rotors.set_duty([0.6; 4]);
+        let before = settle(&mut rotors, 4.0);
+        let held = [true, false, false, false];
+        let after = (0..16).map(|_| rotors.step(625e-6, 4.0, 1.0, held)).last().expect("steps");
+        let [first, others @ ..] = rotors.speed();
+        assert!(first < 0.01 * others[0], "{:?}", rotors.speed());
+        assert!((after.thrust / before.thrust - 0.75).abs() < 1e-3 && after.torque.x > 1e-3, "{after:?}");
+        // Duty times what it drives through the winding.
+        let stall = 0.6 * 0.6 * 4.0 / IDEAL.motor_resistance;
+        assert!((after.current - (0.75 * before.current + stall)).abs() < 0.02 * stall, "{after:?}");
+        // Let go, it turns again.
+        assert!((settle(&mut rotors, 4.0).thrust / before.thrust - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
     fn a_motor_that_is_switched_off_coasts_to_a_stop() {
         let mut rotors = ideal();
         rotors.set_duty([0.6; 4]);
         settle(&mut rotors, 4.0);
         rotors.set_duty([0.0; 4]);
-        let loads = rotors.step(1.0 / 1600.0, 4.0, 1.0);
+        let loads = rotors.step(1.0 / 1600.0, 4.0, 1.0, FREE);
         assert_eq!(loads.current, 0.0, "no current flows back");
         settle(&mut rotors, 4.0);
         assert_eq!(rotors.speed(), [0.0; 4]);

@@ -39,6 +39,8 @@ parameters! {
         motor_resistance = 0.5 ["ohm"] in 0.01 ..= 5.0, "Winding, switch and leads of one motor.";
         rotor_inertia = 2.0e-8 ["kg*m^2"] in 1e-10 ..= 1e-4, "Moment of inertia of motor and propeller.";
         manufacturing_spread = 1.0 ["1"] in 0.0 ..= 5.0, "Scales the per-seed differences between rotors and the offset of the centre of mass; 0 is the perfect vehicle.";
+        centre_x = 0.0 ["m"] in -0.02 ..= 0.02, "How far the centre of mass lies ahead of the middle of rotors and feet, beside the difference that the seed makes.";
+        centre_y = 0.0 ["m"] in -0.02 ..= 0.02, "The same to the right.";
         drag_horizontal = 0.02 ["N*s/m"] in 0.0 ..= 1.0, "Rotor drag along body x and y at hover speed of the rotors.";
         drag_vertical = 0.07 ["N*s/m"] in 0.0 ..= 1.0, "Loss of thrust with climb speed at hover.";
         drag_quadratic = 0.005 ["N*s^2/m^2"] in 0.0 ..= 1.0, "Drag of the body over air speed squared.";
@@ -56,7 +58,8 @@ parameters! {
         foot_damping = 2.0 ["N*s/m"] in 0.0 ..= 3.0, "Damper of one foot or corner on the floor.";
         foot_friction = 0.6 ["1"] in 0.0 ..= 2.0, "Friction coefficient of feet and corners.";
         corner_offset = 0.05 ["m"] in 0.005 ..= 0.5, "Distance of each upper corner of the frame from the body's x and y axis.";
-        corner_height = 0.01 ["m"] in 0.0 ..= 0.5, "Height of the upper corners above the body's origin.";
+        corner_height = 0.01 ["m"] in 0.0 ..= 0.5, "Height of the upper corners, and of the propellers, above the body's origin.";
+        propeller_radius = 0.0 ["m"] in 0.0 ..= 0.5, "Radius of the propellers, which stop where they touch the floor; 0 in a frame that is as wide and as high.";
         ground_effect_gain = 0.10 ["1"] in 0.0 ..= 1.0, "Extra thrust with the rotors at the floor.";
         ground_effect_height = 0.05 ["m"] in 0.001 ..= 1.0, "Height over which the ground effect fades by e.";
     }

@@ -201,6 +201,40 @@ proptest! {
     }
 }
 
+#[test]
+fn open_propellers_that_touch_the_floor_stand_and_push_nothing() {
+    let open = PlantParameters { propeller_radius: 0.022, ..perfect() };
+    let over = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
+    let lay = |parameters: &PlantParameters, attitude| {
+        let mut plant = calm(parameters, Some(&Pose { attitude, rotors: 0.0, ..Pose::hovering(0.06) }));
+        run(&mut plant, 1.0);
+        plant.set_duty([0.4; 4]);
+        run(&mut plant, 1.0);
+        plant
+    };
+    let on_its_back = lay(&open, over);
+    assert!(on_its_back.rotors().speed().iter().all(|speed| *speed < 1.0), "{:?}", on_its_back.motion());
+    assert!(on_its_back.ground().scrapes() > 0 && on_its_back.motion().velocity.norm() < 0.01);
+    // Four motors that are held.
+    let stall = 4.0 * 0.4 * 0.4 * on_its_back.battery().voltage() / open.motor_resistance;
+    assert!((on_its_back.motion().current / (stall + open.board_current) - 1.0).abs() < 0.05);
+    assert!(on_its_back.battery().voltage() < on_its_back.battery().open_circuit() - 0.9 * 0.05 * stall);
+    // Its right side is down.
+    let attitude = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 1.2);
+    let mut tips = calm(&open, Some(&Pose { attitude, ..Pose::hovering(0.04) }));
+    tips.set_duty([0.4; 4]);
+    run(&mut tips, 0.02);
+    let [right, _, left, _] = tips.rotors().speed();
+    assert!(right < 0.4 * left && left > 500.0, "{right}, {left}");
+    // In a frame that is as wide and as high nothing touches them.
+    assert!(lay(&perfect(), over).rotors().speed().iter().all(|speed| *speed > 500.0));
+
+    let mut stands = calm(&open, None);
+    stands.set_duty([0.3; 4]);
+    run(&mut stands, 1.0);
+    assert!(stands.ground().contact() && stands.ground().scrapes() == 0);
+}
+
 /// The loop over the voltage of the step before swung by volts above 0.125 Ω with these motors.
 #[test]
 fn a_weak_battery_is_steady() {

@@ -3,8 +3,9 @@
 use crate::Parameters;
 use stampfly_fixed_wing::Config;
 use stampfly_fixed_wing::config::{Flare, Ground, Heights, Limits, Paths, Speeds};
+use stampfly_fixed_wing::crash::CrashConfig;
 
-/// What these parameters say. What belongs to the strip is the crate's default.
+/// What these parameters say. What belongs to the strip and to the airframe is the crate's default.
 #[must_use]
 pub fn config(p: &Parameters) -> Config {
     Config {
@@ -40,5 +41,6 @@ pub fn config(p: &Parameters) -> Config {
             fence_height: p.fence.height,
             battery: p.battery.warning,
         },
+        crash: CrashConfig::default(),
     }
 }

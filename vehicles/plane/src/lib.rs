@@ -8,6 +8,7 @@
 //! | [`behaviour`] | its speeds, heights and limits there |
 //! | [`navigation`] | where it is, and how the air moves |
 //! | [`autopilot`] | gains, surfaces and throttle |
+//! | [`protection`] | what this airframe bears, and what its inertial sensor must show |
 //! | [`ground`] | what programs at the other end of the link may do |
 //! | [`parameters`] | its numbers |
 #![no_std]
@@ -21,6 +22,7 @@ pub mod behaviour;
 pub mod ground;
 pub mod navigation;
 pub mod parameters;
+pub mod protection;
 pub mod runnables;
 pub mod schedule;
 #[cfg(feature = "simulation")]

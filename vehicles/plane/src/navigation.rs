@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use stampfly_eskf::aid::field;
 use stampfly_eskf::calibration::{IronCorrection, StillCalibration};
 use stampfly_eskf::{Air, Eskf, EskfConfig, Estimator, Measurements, StartHeading, feed};
-use stampfly_fixed_wing::messages::{AirState, Home};
+use stampfly_fixed_wing::messages::{AirState, Home, MeasuredHeights};
 use stampfly_types::messages::*;
 use stampfly_types::{Duration, Instant, Stamped, Vec3};
 
@@ -49,6 +49,9 @@ pub struct Navigation {
     baro_at: Option<Instant>,
     fix_at: Option<Instant>,
     altitude: f32,
+    heights: MeasuredHeights,
+    /// Pressure altitude at home, m.
+    altitude_home: Option<f32>,
     now: Instant,
 }
 
@@ -75,6 +78,8 @@ impl Navigation {
             baro_at: None,
             fix_at: None,
             altitude: 0.0,
+            heights: MeasuredHeights::default(),
+            altitude_home: None,
             now: Instant::ZERO,
         }
     }
@@ -100,6 +105,10 @@ impl Navigation {
         }
         if let Some(sample) = baro.last() {
             (self.baro_at, self.altitude) = (Some(sample.at), sample.data.altitude);
+            if self.home.known {
+                let home = *self.altitude_home.get_or_insert(sample.data.altitude);
+                (self.heights.barometer, self.heights.barometer_at) = (sample.data.altitude - home, sample.at);
+            }
         }
         feed(&mut self.eskf, &Measurements { imu, baro, ..Measurements::default() }, |_, _, _| {});
         for sample in mag {
@@ -124,6 +133,10 @@ impl Navigation {
             self.home = Home { latitude: data.latitude, longitude: data.longitude, altitude, known: true };
         }
         let Some(origin) = self.home.origin() else { return };
+        if data.fix == GnssFix::ThreeDimensional {
+            let height = data.altitude - origin.altitude as f32 * 1e-3;
+            (self.heights.receiver, self.heights.receiver_at) = (height, *at);
+        }
         let has_baro = self.baro_at.is_some_and(|seen| at.since(seen) < SILENT);
         let flat = data.fix == GnssFix::ThreeDimensional && has_baro;
         let fix = if flat { GnssFix::TwoDimensional } else { data.fix };
@@ -151,6 +164,12 @@ impl Navigation {
     #[must_use]
     pub const fn home(&self) -> &Home {
         &self.home
+    }
+
+    /// Heights that nothing has estimated.
+    #[must_use]
+    pub const fn heights(&self) -> &MeasuredHeights {
+        &self.heights
     }
 
     /// The air.

@@ -1,20 +1,24 @@
 //! What the schedule runs: each reads its topics, steps a component, publishes.
 //!
-//! What decides or computes is in [`navigation`](crate::navigation), [`autopilot`] and [`stampfly_fixed_wing`]; change it there.
+//! What decides or computes is in [`navigation`](crate::navigation), [`autopilot`], [`protection`]
+//! and [`stampfly_fixed_wing`]; change it there.
 
 use crate::autopilot;
 use crate::behaviour;
 use crate::navigation::{Navigation, Samples};
 use crate::parameters::Parameters;
+use crate::protection;
 use crate::topics::*;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, Runnable};
 use stampfly_control::fixed_wing::{Autopilot, AutopilotConfig, Flown};
 use stampfly_control::timing::StepTimer;
-use stampfly_fixed_wing::messages::Home;
+use stampfly_fixed_wing::messages::{Home, MeasuredHeights};
 use stampfly_fixed_wing::{Config, PathManager, Sensed, Watch, Watched};
+use stampfly_mode::FailsafeInput;
 use stampfly_param::ParameterSet;
+use stampfly_types::messages::{Alerts, ControlOutput, SelfTestVerdict};
 use stampfly_types::{Duration, Instant, Stamped};
 
 /// An estimate that is older is none: ten samples were missed.
@@ -27,11 +31,13 @@ const UNMEASURED: Duration = Duration::from_secs(2);
 pub struct Estimation {
     navigation: Navigation,
     home: Home,
+    heights: MeasuredHeights,
 }
 
 impl Estimation {
     pub(crate) fn new(parameters: &Parameters) -> Self {
-        Self { navigation: Navigation::new(parameters), home: Home::default() }
+        let (home, heights) = (Home::default(), MeasuredHeights::default());
+        Self { navigation: Navigation::new(parameters), home, heights }
     }
 }
 
@@ -55,6 +61,52 @@ impl Runnable for Estimation {
             self.home = *self.navigation.home();
             ends.home.publish(now, &self.home);
         }
+        if *self.navigation.heights() != self.heights {
+            self.heights = *self.navigation.heights();
+            ends.measured_heights.publish(now, &self.heights);
+        }
+    }
+}
+
+/// Inertial samples to what is wrong.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Failsafe(stampfly_mode::Failsafe);
+
+impl Failsafe {
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        Self(stampfly_mode::Failsafe::new(protection::config(parameters)))
+    }
+}
+
+impl Runnable for Failsafe {
+    type Ends<'b> = FailsafeEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut FailsafeEnds<'_>) {
+        let now = activation.now();
+        // They change on the ground, and with a sample: before it the sensor would count as silent.
+        if ends.parameters.is_new() && !ends.sensor_imu.is_empty() {
+            self.0 = stampfly_mode::Failsafe::new(protection::config(ends.parameters.get()));
+        }
+        let heard = ends.path_status.get().heard;
+        let alert = self.0.step(
+            now,
+            &FailsafeInput {
+                imu: &ends.sensor_imu,
+                estimate: &protection::above_any_ground(ends.estimate_state.get()),
+                status: ends.estimate_status.get(),
+                power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
+                command: (heard > Instant::ZERO).then_some(heard),
+                // It has neither; that the barometer is silent, the watch need not know.
+                tof: Some(now),
+                flow: Some(now),
+                baro: Some(now),
+                output: &ControlOutput::default(),
+                thrust: None,
+                self_test: SelfTestVerdict::NotRun,
+                flight_status: ends.flight_status.get(),
+            },
+        );
+        ends.system_alert.publish(now, &alert);
     }
 }
 
@@ -83,7 +135,8 @@ impl Runnable for Control {
             self.config = autopilot::config(ends.parameters.get());
         }
         let demand = ends.demand.get();
-        let (motor, servos) = match ends.estimate_state.fresh(now, OLD) {
+        let faulty = ends.system_alert.get().active.contains(Alerts::IMU_FAULTY);
+        let (motor, servos) = match ends.estimate_state.fresh(now, OLD).filter(|_| !faulty) {
             Some(state) => {
                 let flown = self.autopilot.step(dt, demand, state, ends.air.get(), &self.config);
                 autopilot::outputs(&flown, demand.brake, ends.flight_status.get().armed)
@@ -117,12 +170,19 @@ impl Runnable for Watching {
         if ends.parameters.is_new() {
             self.config = behaviour::config(ends.parameters.get());
         }
-        let heard = ends.path_status.get().heard;
+        let status = ends.path_status.get();
+        let alerts = ends.system_alert.get().active;
+        let faulty = alerts.contains(Alerts::IMU_FAULTY);
         let watched = Watched {
-            estimate: ends.estimate_state.fresh(now, OLD),
+            // What does not measure shows no attitude.
+            estimate: ends.estimate_state.fresh(now, OLD).filter(|_| !faulty),
             air: ends.air.get(),
             power: ends.sensor_power.fresh(now, UNMEASURED),
-            heard: (heard > Instant::ZERO).then_some(heard),
+            heard: (status.heard > Instant::ZERO).then_some(status.heard),
+            heights: ends.measured_heights.get().both(),
+            place: status.place,
+            armed: ends.flight_status.get().armed,
+            blow: alerts.intersects(protection::BLOW),
             config: &self.config,
         };
         ends.safety.publish(now, &self.watch.step(now, &watched));

@@ -13,8 +13,10 @@ stampfly_bus::schedule! {
 
     /// Sensors to state, wind and airspeed.
     estimation = Estimation: on sensor_imu, flight, 400 us;
+    /// Every inertial sample to what is wrong: a blow, a sensor that does not measure.
+    failsafe = Failsafe: after estimation or at latest 10 ms, flight, 60 us;
     /// Demand and state to surfaces and throttle. Without samples it still closes the throttle.
-    control = Control: after estimation or at latest 10 ms, flight, 100 us;
+    control = Control: after failsafe or at latest 10 ms, flight, 100 us;
     /// What is wrong.
     watch = Watching: every 20 ms, background, 40 us;
     /// The path manager.

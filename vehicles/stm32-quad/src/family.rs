@@ -3,12 +3,14 @@
 //! It knows its attitude and rates, and nothing of where it is: those numbers are zero and marked as not valid.
 
 use crate::messages::{Attitude, ControlState, ReceiverInput};
+use crate::protection::CUT;
 use stampfly_types::messages::*;
 
 /// Where it is between power-on and landing, as far as it can tell: with motors that turn it flies.
 #[must_use]
-pub fn status(state: &ControlState, attitude: Option<&Attitude>, turning: bool) -> FlightStatus {
+pub fn status(state: &ControlState, attitude: Option<&Attitude>, turning: bool, alerts: Alerts) -> FlightStatus {
     let blocks = [
+        (ArmBlocks::CRASHED, alerts.intersects(CUT)),
         (ArmBlocks::SENSOR, attitude.is_none()),
         (ArmBlocks::CALIBRATING, state.calibrating),
         (ArmBlocks::NO_LINK, !state.online),

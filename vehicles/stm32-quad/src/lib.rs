@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`topics`], [`schedule`], [`runnables`] | the two tables, and what runs |
 //! | [`attitude`], [`rate_loops`], [`battery`], [`lamps`], [`startup`] | components, without a clock or a bus |
+//! | [`protection`], [`airframe`] | what stops the motors beside the pilot, and the frame that it is for |
 //! | [`receiver`], [`serial`] | a transmitter's packets, through the radio; MSP on the serial line |
 //! | [`frame`] | which motors an axis moves |
 //! | [`eeprom`] | what is kept while it is off |
@@ -18,6 +19,7 @@
 #[macro_use]
 extern crate std;
 
+pub mod airframe;
 pub mod attitude;
 pub mod battery;
 pub mod eeprom;
@@ -26,6 +28,7 @@ pub mod frame;
 pub mod lamps;
 pub mod messages;
 pub mod parameters;
+pub mod protection;
 pub mod rate_loops;
 pub mod receiver;
 pub mod runnables;

@@ -1,13 +1,16 @@
 //! The modules of the original: each reads its topics, steps a component, publishes.
 //!
 //! What decides or computes is in [`attitude`](crate::attitude), [`rate_loops`](crate::rate_loops),
-//! [`battery`](crate::battery) and [`lamps`](crate::lamps); change it there.
+//! [`protection`](crate::protection), [`battery`](crate::battery) and [`lamps`](crate::lamps);
+//! change it there.
 
+use crate::airframe::AIRFRAME;
 use crate::attitude::Sensing;
 use crate::battery::Battery;
 use crate::lamps::{Lamps, pattern};
 use crate::messages::*;
 use crate::parameters::Parameters;
+use crate::protection::{CUT, Looked, Protection};
 use crate::rate_loops::{Demand, RateLoops};
 use crate::topics::*;
 use crate::{family, frame};
@@ -66,6 +69,38 @@ impl Runnable for Sensor {
     }
 }
 
+/// What has gone wrong.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Failsafe(Protection);
+
+impl Failsafe {
+    pub(crate) fn new(parameters: &Parameters) -> Self {
+        Self(Protection::new(&AIRFRAME, parameters))
+    }
+}
+
+impl Runnable for Failsafe {
+    type Ends<'b> = FailsafeEnds<'b>;
+
+    fn run(&mut self, activation: &mut Activation, ends: &mut FailsafeEnds<'_>) {
+        if ends.parameters.is_new() {
+            self.0.adopt(&AIRFRAME, ends.parameters.get());
+        }
+        let now = activation.now();
+        let output = ends.actuator_motor.get();
+        let looked = Looked {
+            attitude: ends.attitude.fresh(now, within(SENSING_LOST)),
+            state: ends.control_state.get(),
+            wanted: ends.rate_demand.fresh(now, within(SENSING_LOST)).map_or(Vec3::zeros(), |demand| demand.setpoint),
+            duty: output.duty.get(..usize::from(output.count)).unwrap_or_default(),
+            power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
+            heard: ends.receiver_input.sample().map(|sample| sample.at),
+        };
+        let alert = self.0.step(now, &ends.sensor_imu, &looked);
+        ends.system_alert.publish(now, &alert);
+    }
+}
+
 /// Sticks and attitude to motors.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Controller {
@@ -96,7 +131,9 @@ impl Runnable for Controller {
         let input = ends.receiver_input.fresh(now, within(OFFLINE));
         let attitude = ends.attitude.fresh(now, within(SENSING_LOST));
         let sticks = input.map(|input| [input.throttle, input.yaw]);
-        let Gestured { armed, calibrating } = self.gestures.step(now, sticks, attitude.is_some());
+        // What has crashed is disarmed, and is not armed while it lies.
+        let ready = attitude.is_some() && !ends.system_alert.get().active.intersects(CUT);
+        let Gestured { armed, calibrating } = self.gestures.step(now, sticks, ready);
         let angle_mode = input.is_some_and(|input| input.aux[0] < ANGLE);
         let state = ControlState { armed, calibrating, angle_mode, online: input.is_some() };
         ends.control_state.publish(now, &state);
@@ -175,7 +212,8 @@ impl Runnable for Communication {
         let now = activation.now();
         let attitude = ends.attitude.fresh(now, within(SENSING_LOST));
         let duty = &ends.actuator_motor.get().duty;
-        let status = family::status(ends.control_state.get(), attitude, duty.iter().any(|duty| *duty > 0.0));
+        let turning = duty.iter().any(|duty| *duty > 0.0);
+        let status = family::status(ends.control_state.get(), attitude, turning, ends.system_alert.get().active);
         ends.flight_status.publish(now, &status);
         ends.estimate_state.publish(now, &family::estimate(attitude));
         if ends.receiver_input.is_new() {

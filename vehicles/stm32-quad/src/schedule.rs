@@ -19,9 +19,11 @@ stampfly_bus::schedule! {
     pub struct Runnables on crate::topics from Parameters;
 
     /// Sample to attitude; calibration.
-    sensor = Sensor: on sensor_imu, flight, 60 us;
+    sensor = Sensor: on sensor_imu, flight, 50 us;
+    /// What samples show to have gone wrong. That there are none is the controller's matter.
+    failsafe = Failsafe: after sensor, flight, 40 us;
     /// Sticks and attitude to motors. Without samples it still stops them.
-    controller = Controller: after sensor or at latest 500 us, flight, 60 us;
+    controller = Controller: after failsafe or at latest 500 us, flight, 45 us;
     /// Parameters.
     storage = Storage: every 10 ms, background, 40 us;
     /// What services on the serial line are told.

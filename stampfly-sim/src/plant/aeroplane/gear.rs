@@ -1,16 +1,21 @@
 //! A flat ground at z = 0, the three wheels that roll on it, and what hits it in a crash: nose, tail, fin and wing tips.
 //!
-//! Each point is a spring and a damper along the vertical, and a spring with Coulomb's limit along and across its way. A wheel's
-//! limits are its rolling friction (or its brake) along and its tyre's across, so it stands still without creeping, rolls, and does
-//! not slide. On its way a tyre gives its side deflection back, after a relaxation length (Pacejka, Tyre and Vehicle Dynamics), which makes its cornering stiffness. The ground does not pull.
+//! Each point is a spring and a damper along the vertical, and a spring with Coulomb's limit along
+//! and across its way. A wheel's limits are its rolling friction (or its brake) along and its
+//! tyre's across, so it stands still without creeping, rolls, and does not slide. The propeller is
+//! a disc: where any of it is below the ground, it stops. On its way a tyre gives its side
+//! deflection back, after a relaxation length (Pacejka, Tyre and Vehicle Dynamics), which makes its
+//! cornering stiffness. The ground does not pull.
 
 use super::AeroplaneParameters;
 use crate::plant::DT;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Points that can touch: nose wheel, right and left main wheel, then propeller tip, tail, fin, right and left wing tip.
-const POINTS: usize = 8;
+/// Points that can touch: nose wheel, right and left main wheel, tail skid, then propeller tip,
+/// spinner, fin, right and left wing tip.
+const POINTS: usize = 9;
 const WHEELS: usize = 3;
+const SKIDS: usize = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Point {
@@ -33,6 +38,10 @@ pub struct Gear {
     relaxation: f64,
     friction: f64,
     strikes: u64,
+    scrapes: u64,
+    /// Middle of the propeller's disc, and its radius.
+    hub: Vector3<f64>,
+    radius: f64,
 }
 
 impl Gear {
@@ -55,8 +64,9 @@ impl Gear {
             wheel(p.gear_nose, 0.0, on_nose),
             wheel(-p.gear_main, half_track, 0.5 * (weight - on_nose)),
             wheel(-p.gear_main, -half_track, 0.5 * (weight - on_nose)),
-            hard(p.propeller_ahead, 0.0, p.propeller_below + 0.5 * p.propeller_diameter),
             hard(-p.tail_behind, 0.0, p.tail_below),
+            hard(p.propeller_ahead, 0.0, p.propeller_below + 0.5 * p.propeller_diameter),
+            hard(p.propeller_ahead, 0.0, p.propeller_below),
             hard(-p.tail_behind, 0.0, -p.fin_above),
             hard(0.0, half_span, -p.tips_above),
             hard(0.0, -half_span, -p.tips_above),
@@ -71,6 +81,9 @@ impl Gear {
             relaxation: p.wheel_relaxation,
             friction: p.body_friction,
             strikes: 0,
+            scrapes: 0,
+            hub: Vector3::new(p.propeller_ahead, 0.0, p.propeller_below),
+            radius: 0.5 * p.propeller_diameter,
         }
     }
 
@@ -86,10 +99,29 @@ impl Gear {
         core::array::from_fn(|wheel| self.deflections[wheel].is_some())
     }
 
-    /// In how many steps something has touched the ground that should not: the propeller, the tail, the fin, a wing tip.
+    /// In how many steps something has touched the ground that is no wheel: the propeller, the
+    /// spinner, the tail, the fin, a wing tip.
     #[must_use]
     pub fn strikes(&self) -> u64 {
         self.strikes
+    }
+
+    /// In how many steps something has touched the ground that does not carry an aeroplane: as
+    /// [`strikes`](Self::strikes), but for the tail, which has a skid.
+    #[must_use]
+    pub fn scrapes(&self) -> u64 {
+        self.scrapes
+    }
+
+    /// Does the propeller touch the ground?
+    pub(super) fn holds_propeller(&self, position: &Vector3<f64>, attitude: &UnitQuaternion<f64>) -> bool {
+        if -position.z > self.reach {
+            return false;
+        }
+        // From the hub to the lowest place of the disc, which stands across body x.
+        let nose = (attitude * Vector3::x()).z;
+        let lowest = self.radius * (1.0 - nose * nose).max(0.0).sqrt();
+        position.z + (attitude * self.hub).z + lowest > 0.0
     }
 
     /// Force (world) and torque (body) of the ground, with the nose wheel turned by `steering` (rad, right is positive) and the main
@@ -108,7 +140,7 @@ impl Gear {
             self.deflections = [None; POINTS];
             return (force, torque);
         }
-        let mut strikes = false;
+        let [mut strikes, mut scrapes] = [false; 2];
         for (index, (point, deflection)) in self.points.iter().zip(&mut self.deflections).enumerate() {
             let arm = attitude * point.place;
             let depth = position.z + arm.z;
@@ -118,6 +150,7 @@ impl Gear {
             }
             let is_wheel = index < WHEELS;
             strikes |= !is_wheel;
+            scrapes |= index >= SKIDS;
             let speed = velocity + attitude * rate.cross(&point.place);
             let normal = (point.stiffness * depth + point.damping * speed.z).max(0.0);
             let turned = if index == 0 { libm::sincos(steering) } else { (0.0, 1.0) };
@@ -149,6 +182,7 @@ impl Gear {
             torque += point.place.cross(&attitude.inverse_transform_vector(&here));
         }
         self.strikes += u64::from(strikes);
+        self.scrapes += u64::from(scrapes);
         (force, torque)
     }
 }

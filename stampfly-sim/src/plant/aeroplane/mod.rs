@@ -142,8 +142,9 @@ impl Aeroplane {
         let angles = core::array::from_fn(|i| shares[i] * reaches[i]);
         let air = self.through_air();
 
+        let held = self.gear.holds_propeller(&m.position, &m.attitude);
         let voltage = self.battery.under(p.board_current, &[self.propeller.load()]);
-        let thrust = self.propeller.step(DT, voltage, air.x);
+        let thrust = self.propeller.step(DT, voltage, air.x, held);
         let current = thrust.current + p.board_current;
         self.battery.step(DT, current);
         let (mut force, mut torque) =
@@ -275,6 +276,10 @@ impl Body for Aeroplane {
 
     fn contact(&self) -> bool {
         self.gear.contact()
+    }
+
+    fn scrapes(&self) -> u64 {
+        self.gear.scrapes()
     }
 
     fn nominal_rotor_speed(&self) -> f64 {

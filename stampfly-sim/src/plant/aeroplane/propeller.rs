@@ -6,12 +6,18 @@
 //! thrust   T = ρ·n²·D⁴·Ct(J),  torque  Q = ρ·n²·D⁵·Cp(J) / 2π,  advance ratio J = V / (n·D)
 //! ```
 //!
+//! A propeller that touches the ground stands: no thrust, and the current of a motor that is held.
+//!
 //! V is the speed of the air along the axis; across it the propeller feels nothing, nor do wing and tail feel its slipstream.
 
 use super::AeroplaneParameters;
 use crate::plant::RotorFault;
 use crate::plant::battery::Load;
 use core::f64::consts::TAU;
+
+/// Time constant with which a propeller that touches the ground stops, s: half a turn of a small
+/// one.
+const STOPS: f64 = 0.003;
 
 /// What the propeller does to the body in one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -112,13 +118,20 @@ impl Propeller {
         Load::of_motor(self.switched(), self.resistance, self.constant * self.speed)
     }
 
-    /// One step of `dt` seconds on `voltage`.
-    pub(super) fn step(&mut self, dt: f64, voltage: f64, air: f64) -> PropellerLoads {
+    /// One step of `dt` seconds on `voltage`. `held`: it touches the ground.
+    pub(super) fn step(&mut self, dt: f64, voltage: f64, air: f64, held: bool) -> PropellerLoads {
         let duty = self.switched();
         let current = ((duty * voltage - self.constant * self.speed) / self.resistance).max(0.0);
+        let before = self.speed;
+        if held {
+            // What stops it pushes outside of the body, which feels the motor alone.
+            self.speed = before * (1.0 - dt / STOPS).max(0.0);
+            let torque = -self.spin * self.constant * current;
+            let momentum = self.spin * self.inertia * before;
+            return PropellerLoads { thrust: 0.0, torque, momentum, current: duty * current };
+        }
         let [thrust, drag] = self.at(self.speed, air);
         let net = self.constant * (current - self.idle_current) - drag;
-        let before = self.speed;
         self.speed = (before + net / self.inertia * dt).max(0.0);
         let reaction = drag + self.inertia * (self.speed - before) / dt;
         PropellerLoads {
@@ -137,7 +150,7 @@ mod tests {
     fn settled(duty: f64, air: f64) -> (Propeller, PropellerLoads) {
         let mut propeller = Propeller::new(&AeroplaneParameters::EXAMPLE, 500.0);
         propeller.set_duty(duty);
-        let loads = (0..3200).map(|_| propeller.step(625e-6, 11.5, air)).last().expect("steps");
+        let loads = (0..3200).map(|_| propeller.step(625e-6, 11.5, air, false)).last().expect("steps");
         (propeller, loads)
     }
 
@@ -162,6 +175,16 @@ mod tests {
         let [thrust, torque] = propeller.at(turns * TAU, 0.4888 * turns * d);
         assert!((thrust / (1.225 * turns * turns * d.powi(4)) - 0.0514).abs() < 1e-3);
         assert!((torque * TAU / (1.225 * turns * turns * d.powi(5)) - 0.0317).abs() < 1.1e-3);
+    }
+
+    #[test]
+    fn in_the_ground_it_stands_and_its_motor_takes_the_current_of_a_stall() {
+        let (mut propeller, before) = settled(0.5, 0.0);
+        let loads = (0..32).map(|_| propeller.step(625e-6, 11.5, 0.0, true)).last().expect("steps");
+        assert!(propeller.speed() < 1.0 && loads.thrust == 0.0, "{propeller:?} {loads:?}");
+        // Duty times what it drives through the winding.
+        let stall = 0.5 * 0.5 * 11.5 / AeroplaneParameters::EXAMPLE.motor_resistance;
+        assert!((loads.current / stall - 1.0).abs() < 0.02 && loads.current > 3.0 * before.current, "{loads:?}");
     }
 
     #[test]

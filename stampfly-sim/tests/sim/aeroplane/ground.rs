@@ -87,3 +87,42 @@ fn a_cross_wind_pushes_but_does_not_turn_it_over() {
     run(&mut plane, 20.0);
     assert!(roll(&plane).abs() < 0.05 && plane.gear().strikes() == 0, "{:?}", plane.motion());
 }
+
+/// It used to turn in the ground, and to pull the aeroplane along on its back.
+#[test]
+fn a_propeller_that_touches_the_ground_stands_and_takes_the_current_of_a_stall() {
+    let turned = |angle: f64, axis: Vector3<f64>| {
+        let (sin, cos) = (0.5 * angle).sin_cos();
+        let axis = axis * sin;
+        nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(cos, axis.x, axis.y, axis.z))
+    };
+    let lay = |attitude, height: f64| {
+        let standing = PERFECT.standing([0.0; 2], 0.0);
+        let pose = Pose { position: Vector3::new(0.0, 0.0, -height), attitude, rotors: 0.5, ..standing };
+        let mut plane = Aeroplane::new(&PERFECT, &WindConfig::CALM, Some(&pose), 1);
+        plane.set_duty(0.8);
+        run(&mut plane, 3.0);
+        plane
+    };
+    for (attitude, height) in [(turned(core::f64::consts::PI, Vector3::x()), 0.2), (turned(-1.3, Vector3::y()), 0.35)] {
+        let plane = lay(attitude, height);
+        assert!(plane.propeller().speed() < 1.0 && plane.gear().scrapes() > 0, "{:?}", plane.motion());
+        assert!(plane.motion().current > 0.8 * 0.8 * 9.0 / PERFECT.motor_resistance, "{:?}", plane.motion());
+        assert!(plane.motion().velocity.norm() < 0.1, "nothing pulls it: {:?}", plane.motion());
+    }
+    let mut plane = rolling(0.0, &[(Surface::Brake, 1.0)]);
+    plane.set_duty(0.35);
+    run(&mut plane, 2.0);
+    assert!(plane.propeller().speed() > 300.0 && plane.gear().scrapes() == 0, "{:?}", plane.motion());
+}
+
+#[test]
+fn the_skid_is_there_to_touch() {
+    let standing = PERFECT.standing([0.0; 2], 0.0);
+    let (sin, cos) = 0.15f64.sin_cos();
+    let nose_up = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(cos, 0.0, sin, 0.0));
+    let pose = Pose { attitude: nose_up, ..standing };
+    let mut plane = Aeroplane::new(&PERFECT, &WindConfig::CALM, Some(&pose), 1);
+    run(&mut plane, 2.0);
+    assert!(plane.gear().strikes() > 0 && plane.gear().scrapes() == 0, "{:?}", plane.gear());
+}

@@ -3,7 +3,7 @@
 use core::cell::Cell;
 use stampfly_sim::World;
 use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
-use stampfly_sim::plant::{Aeroplane, Surface};
+use stampfly_sim::plant::{Aeroplane, RotorFault, Surface};
 use stampfly_types::{Duration, Instant, Message};
 use std::prelude::v1::*;
 use std::rc::Rc;
@@ -20,6 +20,26 @@ pub const FAULTS: &[FaultKind] = &[
     FaultKind::number("gyro-bias", ("rad/s", 0.02, -0.5, 0.5), Class::Degraded, "The roll rate is too high by this."),
     FaultKind::plain("link-lost", Class::Landed, "Nobody is heard."),
     FaultKind::plain("aileron-jammed", Class::Degraded, "The right aileron stays in its middle."),
+    FaultKind::plain("imu-stuck", Class::Cut, "Inertial samples repeat the last one."),
+    FaultKind::number(
+        "accel-bias",
+        ("m/s^2", 0.5, -30.0, 30.0),
+        Class::Degraded,
+        "The vertical acceleration is too high by this.",
+    ),
+    FaultKind::plain("propeller-lost", Class::Landed, "The propeller has no thrust."),
+    FaultKind::number(
+        "elevator-jammed",
+        ("", 0.0, -1.0, 1.0),
+        Class::Cut,
+        "The elevator stays at this share of its deflection.",
+    ),
+    FaultKind::number(
+        "rudder-jammed",
+        ("", 0.0, -1.0, 1.0),
+        Class::Degraded,
+        "The rudder, and the nose wheel with it, stay at this share of their deflection.",
+    ),
 ];
 
 /// What is wrong in one flight.
@@ -40,9 +60,12 @@ impl Wrong {
         let effect = |fault: &Fault| {
             let value = fault.value.unwrap_or_default() as f32;
             let name = fault.kind.name;
-            // A gyro is in the inertial sensor.
-            let gyro = name.strip_prefix("gyro").filter(|_| sensor == "imu");
-            match name.strip_prefix(sensor).or(gyro)? {
+            // Gyro and accelerometer are in the inertial sensor.
+            let inside = ["gyro", "accel"].iter().find_map(|part| name.strip_prefix(part));
+            let inside = inside.filter(|_| sensor == "imu");
+            match name.strip_prefix(sensor).or(inside)? {
+                "-stuck" => Some(Distortion::whole(Effect::Stuck)),
+                "-bias" if name == "accel-bias" => Some(Distortion::of(&["accel[2]"], Effect::Add(value))),
                 "-silent" => Some(Distortion::SILENT),
                 "-lost" => Some(Distortion::of(&["fix"], Effect::Word(0))),
                 "-blocked" => Some(Distortion::of(&["pressure"], Effect::Set(0.0))),
@@ -62,9 +85,18 @@ impl Wrong {
             let active = self.injector.is_active(place, now);
             match fault.kind.name {
                 "link-lost" => silent |= active,
-                "aileron-jammed" => {
-                    let at = active.then_some(0.0);
-                    world.change(now, |plane: &mut Aeroplane| plane.jam(Surface::RightAileron, at));
+                "aileron-jammed" | "elevator-jammed" | "rudder-jammed" => {
+                    let at = active.then(|| fault.value.unwrap_or_default());
+                    let surface = match fault.kind.name {
+                        "elevator-jammed" => Surface::Elevator,
+                        "rudder-jammed" => Surface::Rudder,
+                        _ => Surface::RightAileron,
+                    };
+                    world.change(now, |plane: &mut Aeroplane| plane.jam(surface, at));
+                }
+                "propeller-lost" => {
+                    let thrust = if active { 0.0 } else { 1.0 };
+                    world.set_rotor_fault(now, 0, RotorFault { thrust, ..RotorFault::NONE });
                 }
                 _ => continue,
             }

@@ -29,7 +29,7 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle;
 use stampfly_sim::watched::{Shown, Spectator};
 use stampfly_sim::{Simulation, Truth, World};
-use stampfly_types::messages::{FlightStatus, StateEstimate};
+use stampfly_types::messages::{FlightStatus, MotorOutput, StateEstimate};
 use stampfly_types::{Duration, Instant, frame, math};
 use std::prelude::v1::*;
 
@@ -146,6 +146,8 @@ struct Seen {
     armed: bool,
     /// It may be armed.
     ready: bool,
+    /// The propeller is told to turn.
+    turns: bool,
 }
 
 /// The world during a flight, and what is watched of it.
@@ -167,7 +169,10 @@ pub struct Around<'a> {
 impl Around<'_> {
     fn look(&mut self, now: Instant, truth: &Truth) {
         let height = self.world.height_at(now) - self.setup.simulation.plant.gear_height;
-        let Seen { estimate, demand, path, armed, ready } = &self.seen;
+        let Seen { estimate, demand, path, armed, ready, turns } = &self.seen;
+        let fence = &self.setup.parameters.fence;
+        let away = truth.position.horizontal().norm() - fence.radius;
+        let outside = away.max(-truth.position.z - fence.height).max(0.0);
         let shown = Shown {
             ready: *ready,
             armed: *armed,
@@ -175,6 +180,9 @@ impl Around<'_> {
             stays: false,
             moves: path.place == Place::CruisingCruise,
             lands: path.place == Place::LandingSlope,
+            turns: *turns,
+            scrapes: self.world.inspect(|body| body.scrapes()),
+            beside: outside.into(),
         };
         self.outcome.look(now, &shown, truth, &self.wrong.injector);
         let Measured { beside, height: heights, heading, position, .. } = &mut self.outcome.measured;
@@ -220,6 +228,10 @@ impl vehicle::Around for Around<'_> {
             Some(Id::estimate_state) => seen.estimate = message(words).unwrap_or(seen.estimate),
             Some(Id::demand) => seen.demand = message(words).unwrap_or(seen.demand),
             Some(Id::path_status) => seen.path = message(words).unwrap_or(seen.path),
+            Some(Id::actuator_motor) => {
+                seen.turns =
+                    message(words).is_some_and(|output: MotorOutput| output.duty.iter().any(|duty| *duty > 0.0));
+            }
             Some(Id::flight_status) => {
                 let status: FlightStatus = message(words).unwrap_or_default();
                 (seen.armed, seen.ready) = (status.armed, status.blocks.is_empty());
@@ -253,7 +265,7 @@ impl vehicle::Around for Around<'_> {
         if let Some(live) = &self.setup.live {
             return live.ports.are_closed();
         }
-        let (end, cut) = (self.progress.finished.get(), self.outcome.cut);
+        let (end, cut) = (self.progress.finished.get(), self.outcome.is_out());
         self.spectator.is_over(now, end, cut, &self.wrong.injector, PATIENCE)
     }
 

@@ -38,6 +38,9 @@ impl Default for Measured {
 }
 
 impl watched::Measured for Measured {
+    /// Outside of its fence, at which it turns: three of its turns.
+    const AWAY: f64 = 200.0;
+
     fn is_degraded(&self) -> bool {
         let beside_strip = self.touchdowns.all().iter().any(|touch| touch.across.abs() > STRIP_HALF);
         beside_strip || self.beside.value().is_some_and(|rms| rms > 6.0)

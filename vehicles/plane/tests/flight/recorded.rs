@@ -9,7 +9,7 @@ use stampfly_plane::simulation::{Outcome, Plane};
 use stampfly_plane::topics::Id;
 use stampfly_sim::Truth;
 use stampfly_sim::vehicle::{Options, Vehicle, Witness};
-use stampfly_types::messages::{FlightStatus, MotorOutput, PowerData, StateEstimate};
+use stampfly_types::messages::{Alerts, FlightStatus, MotorOutput, PowerData, StateEstimate, SystemAlert};
 use stampfly_types::{Duration, Instant, Message};
 
 /// What was the newest on each topic at one cycle of the path manager.
@@ -56,6 +56,8 @@ pub struct Flown {
     pub motor: Vec<(Instant, MotorOutput)>,
     /// Every inertial sample.
     pub imu: Vec<Instant>,
+    /// Every alert since it was armed for the first time.
+    pub alerts: Alerts,
     pub outcome: Outcome,
     now: Row,
 }
@@ -81,6 +83,11 @@ impl Witness<Runnables> for Flown {
                 let mut power = PowerData::default();
                 keep(&mut power, words);
                 now.voltage = power.voltage;
+            }
+            Some(Id::system_alert) if now.status.armed => {
+                let mut alert = SystemAlert::default();
+                keep(&mut alert, words);
+                self.alerts |= alert.active;
             }
             Some(Id::safety) => keep(&mut now.safety, words),
             Some(Id::demand) => keep(&mut now.demand, words),

@@ -1,9 +1,10 @@
 //! What can go wrong in a flight of the quadcopter, and where it acts.
 
+use core::cell::Cell;
 use stampfly_sim::World;
 use stampfly_sim::chips::Air;
 use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
-use stampfly_sim::plant::RotorFault;
+use stampfly_sim::plant::{Beyond, Motion, Plant, RotorFault, Scene};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, Instant};
 use std::prelude::v1::*;
@@ -20,13 +21,33 @@ pub const FAULTS: &[FaultKind] = &[
     ),
     FaultKind::plain("link-lost", Class::Cut, "No packet arrives."),
     FaultKind::number("link-loss", ("", 0.3, 0.0, 1.0), Class::Transparent, "This share of packets is lost."),
+    // With less than half of a rotor the others cannot hold it level.
     FaultKind::number(
         "motor-weak",
         ("", 0.2, 0.0, 1.0),
         Class::Degraded,
         "The first motor's propeller lacks this share of its thrust.",
+    )
+    .above(0.5, Class::Cut),
+    FaultKind::plain("imu-stuck", Class::Cut, "Inertial samples repeat the last one."),
+    FaultKind::number(
+        "motor-stuck",
+        ("", 1.0, 0.0, 1.0),
+        Class::Cut,
+        "The first motor turns at this duty whatever is commanded.",
+    ),
+    FaultKind::number("wall", ("m", 0.4, 0.1, 10.0), Class::Cut, "There is a wall this far ahead of the vehicle."),
+    FaultKind::number("ceiling", ("m", 0.2, 0.05, 10.0), Class::Cut, "There is a ceiling this far above the vehicle."),
+    FaultKind::number(
+        "slope",
+        ("", 0.2, -1.0, 1.0),
+        Class::Degraded,
+        "The floor rises by this for each metre to the north.",
     ),
 ];
+
+/// The plant's rotor that is the document's first motor.
+const FIRST: usize = 1;
 
 /// What is wrong in one flight.
 #[derive(Clone)]
@@ -34,11 +55,13 @@ pub(super) struct Wrong {
     pub injector: Injector,
     /// What the transmitter's packets go through.
     pub air: Air,
+    /// Steps in which an obstacle pushed, at the last look.
+    strikes: Cell<u64>,
 }
 
 impl Wrong {
     pub fn new(faults: &[Fault], start: Instant, air: Air) -> Self {
-        Self { injector: Injector::new(start, faults), air }
+        Self { injector: Injector::new(start, faults), air, strikes: Cell::default() }
     }
 
     /// The way of inertial samples to the bus.
@@ -47,6 +70,7 @@ impl Wrong {
             let value = fault.value.unwrap_or_default() as f32;
             match fault.kind.name {
                 "imu-silent" => Some(Distortion::SILENT),
+                "imu-stuck" => Some(Distortion::whole(Effect::Stuck)),
                 "gyro-bias" => Some(Distortion::of(&["gyro[0]"], Effect::Add(value))),
                 "accel-bias" => Some(Distortion::of(&["accel[0]"], Effect::Add(value))),
                 _ => None,
@@ -60,15 +84,29 @@ impl Wrong {
     /// Switches what acts beside the bus on and off.
     pub fn act(&self, now: Instant, world: &World) {
         let mut loss = 0.0f64;
+        let strikes = world.inspect_as(|plant: &Plant| plant.ground().strikes()).unwrap_or_default();
+        let struck = strikes > self.strikes.replace(strikes);
         for (place, fault) in self.injector.faults().enumerate() {
             let (active, value) = (self.injector.is_active(place, now), fault.value.unwrap_or_default());
             match fault.kind.name {
                 "link-lost" if active => loss = 1.0,
                 "link-loss" if active => loss = loss.max(value),
-                // The document's first motor is the plant's second.
                 "motor-weak" => {
                     let fault = if active { RotorFault { thrust: 1.0 - value, duty: None } } else { RotorFault::NONE };
-                    world.set_rotor_fault(now, 1, fault);
+                    world.set_rotor_fault(now, FIRST, fault);
+                }
+                "motor-stuck" => {
+                    let fault = RotorFault { duty: active.then_some(value), ..RotorFault::NONE };
+                    world.set_rotor_fault(now, FIRST, fault);
+                }
+                "wall" | "ceiling" | "slope" => {
+                    world.change_scene(now, |scene, motion| {
+                        put(scene, motion, fault.kind.name, active.then_some(value))
+                    });
+                    // What nothing runs into changes nothing.
+                    if active && !struck && fault.kind.name != "slope" {
+                        continue;
+                    }
                 }
                 _ => continue,
             }
@@ -77,6 +115,21 @@ impl Wrong {
             }
         }
         self.air.set_loss(loss);
+    }
+}
+
+/// Puts something where the vehicle is, or takes it away; what is there stays.
+fn put(scene: &mut Scene, motion: &Motion, name: &str, value: Option<f64>) {
+    match (name, value) {
+        ("wall", Some(distance)) => scene.wall = scene.wall.or_else(|| Some(Beyond::ahead_of(motion, distance))),
+        ("wall", None) => scene.wall = None,
+        ("ceiling", Some(above)) => scene.ceiling = scene.ceiling.or(Some(above - motion.position.z)),
+        ("ceiling", None) => scene.ceiling = None,
+        (_, Some(rise)) if scene.slope == [0.0; 2] => {
+            (scene.slope, scene.pivot) = ([rise, 0.0], [motion.position.x, motion.position.y]);
+        }
+        (_, None) => scene.slope = [0.0; 2],
+        _ => {}
     }
 }
 

@@ -23,7 +23,7 @@ use stampfly_sim::chips::{self, Air, SpiBus};
 use stampfly_sim::fault::{Fault, Line};
 use stampfly_sim::ground;
 use stampfly_sim::sensors::{MotorModel, Mpu6000Model};
-use stampfly_sim::sight::Progress;
+use stampfly_sim::sight::{Places, Progress};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle;
 use stampfly_sim::watched::{Shown, Spectator};
@@ -114,7 +114,7 @@ impl vehicle::Surroundings for Surroundings {
         let pilot = Pilot::new(clock, world, sticks, setup.parameters.stick, setup.acro).with_lights(lights);
         match &setup.sticks {
             Some(sticks) => tasks.spawn(pilot.play(sticks, progress)),
-            None => tasks.spawn(pilot.fly(&setup.mission, progress)),
+            None => tasks.spawn(pilot.with_stunt(setup.stunt, seed).fly(&setup.mission, progress)),
         }
         if let Some(live) = &setup.live {
             let services = serial::services(live, &wrong.injector, &setup.parameters, newest, outside.link);
@@ -163,10 +163,28 @@ struct Seen {
     attitude: Attitude,
     /// It may be armed.
     ready: bool,
+    /// A motor is told to turn.
+    turns: bool,
     input: ReceiverInput,
     /// Packets while it was armed, and for how long, looks.
     packets: u32,
     looks: u32,
+}
+
+/// How far a place is from the way to the leg after so many that are flown, and from those, m.
+fn beside(Places(legs): &Places, flown: usize, place: &Vec3) -> f32 {
+    let mut from = Vec3::zeros();
+    let mut nearest = f32::INFINITY;
+    for leg in legs.iter().take(flown + 1) {
+        let way = leg.place - from;
+        let along = ((*place - from).dot(&way) / way.norm_squared().max(1e-6)).clamp(0.0, 1.0);
+        // Down to the ground below it is on the way, too.
+        let off = *place - (from + way * along);
+        let off = Vec3::new(off.x, off.y, off.z.min(0.0));
+        nearest = nearest.min(off.norm());
+        from = leg.place;
+    }
+    if nearest.is_finite() { nearest } else { 0.0 }
 }
 
 /// The world during a flight, and what is watched of it.
@@ -188,6 +206,7 @@ impl Around<'_> {
     fn look(&mut self, now: Instant, truth: &Truth) {
         let (state, stays) = (self.lights.get(), self.progress.stays.get());
         let is_last = self.progress.legs.get() == self.outcome.legs[1];
+        let done = self.progress.legs.get();
         let shown = Shown {
             ready: self.seen.ready,
             armed: state.armed,
@@ -195,6 +214,13 @@ impl Around<'_> {
             stays,
             moves: truth.velocity.horizontal().norm() > MOVES,
             lands: is_last && truth.velocity.z > SINKS,
+            turns: self.seen.turns,
+            scrapes: self.world.inspect(|body| body.scrapes()),
+            // Stunts and sticks lead anywhere.
+            beside: match (self.setup.stunt, &self.setup.sticks) {
+                (None, None) => beside(&self.setup.mission, done, &truth.position).into(),
+                _ => 0.0,
+            },
         };
         self.outcome.look(now, &shown, truth, &self.wrong.injector);
         let Measured { attitude, estimate, position, .. } = &mut self.outcome.measured;
@@ -246,6 +272,10 @@ impl vehicle::Around for Around<'_> {
         let seen = &mut self.seen;
         match Id::ALL.get(topic) {
             Some(Id::attitude) => seen.attitude = message(words).unwrap_or(seen.attitude),
+            Some(Id::actuator_motor) => {
+                seen.turns =
+                    message(words).is_some_and(|output: MotorOutput| output.duty.iter().any(|duty| *duty > 0.0));
+            }
             Some(Id::control_state) => self.lights.set(message(words).unwrap_or(self.lights.get())),
             Some(Id::flight_status) => {
                 seen.ready = message(words).is_some_and(|status: FlightStatus| status.blocks.is_empty());
@@ -279,7 +309,9 @@ impl vehicle::Around for Around<'_> {
         if let Some(live) = &self.setup.live {
             return live.ports.are_closed();
         }
-        let (end, cut) = (self.progress.finished.get(), self.outcome.cut);
+        // Sticks are played to their end, whatever they lead to.
+        let out = self.setup.sticks.is_none() && self.outcome.is_out();
+        let (end, cut) = (self.progress.finished.get(), out);
         self.spectator.is_over(now, end, cut, &self.wrong.injector, PATIENCE)
     }
 

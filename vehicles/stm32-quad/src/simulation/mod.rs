@@ -3,7 +3,7 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`plant`] | the frame as a body |
-//! | [`pilot`] | who flies it with a transmitter |
+//! | [`pilot`], [`stunts`] | who flies it with a transmitter, and what for |
 //! | [`radio`] | the transmitter's frames through the air |
 //! | [`serial`] | its ports, for other programs |
 //! | [`faults`] | what can go wrong |
@@ -18,9 +18,11 @@ pub mod plant;
 pub mod radio;
 pub mod serial;
 mod setup;
+pub mod stunts;
 
 pub use outcome::{Measured, Outcome};
 pub use setup::Setup;
+use stunts::Stunt;
 
 use crate::parameters::Parameters;
 use crate::schedule::Runnables;
@@ -47,10 +49,18 @@ const LIMIT: Duration = Duration::from_secs(600);
 /// Missions by name.
 const MISSIONS: [(&str, &str); 2] =
     [("hover", "0,0,1.5,20"), ("square", "0,0,1.5,2; 3,0,1.5,2; 3,3,2,2; 0,3,1.5,2; 0,0,1.5,2")];
+/// Those that are more than places.
+const STUNTS: [(&str, &str, Stunt); 2] =
+    [("freestyle", "0,0,40,1", Stunt::Freestyle(30.0)), ("drop", "0,0,1,2", Stunt::Drop(0.1))];
 
-fn mission_of(text: &str) -> Result<Places, SetupError> {
-    let places = MISSIONS.iter().find(|(name, _)| *name == text).map_or(text, |(_, places)| places);
-    places.parse().map_err(|error| format!("--mission {text}: hover, square, or places: {error}"))
+fn mission_of(text: &str) -> Result<(Places, Option<Stunt>), SetupError> {
+    let stunt = STUNTS.iter().find(|(name, ..)| *name == text);
+    let named = MISSIONS.iter().find(|(name, _)| *name == text).map(|(_, places)| *places);
+    let places = stunt.map(|(_, places, _)| *places).or(named).unwrap_or(text);
+    let places = places
+        .parse()
+        .map_err(|error| format!("--mission {text}: hover, square, freestyle, drop, or places: {error}"))?;
+    Ok((places, stunt.map(|(.., stunt)| *stunt)))
 }
 
 /// Is the mode of this name ACRO? ANGLE is the one without a name.
@@ -87,9 +97,9 @@ impl Vehicle for Stm32Quad {
         let acro = is_acro(pilot.as_deref().unwrap_or_default())?;
         let sticks = options.sticks.as_ref().map(|typed| pilot::sticks_of(typed, options)).transpose()?;
         // In live hands it stands with its transmitter on, unless somebody is to fly it.
-        let mission = match (mission.as_deref(), live) {
-            (None, Some(_)) => Places::default(),
-            _ if sticks.is_some() => Places(vec![Leg { place: Vec3::zeros(), stay: 0.0 }]),
+        let (mission, stunt) = match (mission.as_deref(), live) {
+            (None, Some(_)) => Default::default(),
+            _ if sticks.is_some() => (Places(vec![Leg { place: Vec3::zeros(), stay: 0.0 }]), None),
             (name, _) => mission_of(name.unwrap_or("hover"))?,
         };
         Ok(Setup {
@@ -98,6 +108,7 @@ impl Vehicle for Stm32Quad {
             mission,
             sticks,
             acro,
+            stunt,
             faults: options.faults(Self::FAULTS)?,
             jitter: *jitter,
             chips: *chips,

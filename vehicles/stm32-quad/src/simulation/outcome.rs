@@ -22,6 +22,9 @@ pub struct Measured {
 }
 
 impl watched::Measured for Measured {
+    /// A pilot who flies by sight in the wind that the tests have is within 2 m.
+    const AWAY: f64 = 10.0;
+
     fn is_degraded(&self) -> bool {
         self.attitude.value().is_some_and(|rms| rms > 0.1)
     }

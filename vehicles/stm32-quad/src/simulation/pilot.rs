@@ -8,6 +8,7 @@ mod sticks;
 pub(super) use sticks::sticks_of;
 
 use super::plant::HOVER;
+use super::stunts::{Stunt, Stunts};
 use crate::messages::ControlState;
 use crate::parameters::StickParameters;
 use core::cell::Cell;
@@ -73,6 +74,7 @@ pub struct Pilot<'a> {
     lights: Option<&'a Cell<ControlState>>,
     meaning: StickParameters,
     acro: bool,
+    stunt: Option<(Stunt, Stunts)>,
     eye: Eye,
     hand: Hand,
 }
@@ -87,13 +89,19 @@ impl<'a> Pilot<'a> {
         acro: bool,
     ) -> Self {
         let eye = Eye::new(world, clock.now());
-        Self { clock: clock.clone(), transmitter, lights: None, meaning, acro, eye, hand: Hand::default() }
+        Self { clock: clock.clone(), transmitter, lights: None, meaning, acro, stunt: None, eye, hand: Hand::default() }
     }
 
     /// Sees lights that show this, too. One who does not takes every gesture for understood.
     #[must_use]
     pub fn with_lights(self, lights: &'a Cell<ControlState>) -> Self {
         Self { lights: Some(lights), ..self }
+    }
+
+    /// Flies this besides, from a seed.
+    #[must_use]
+    pub fn with_stunt(self, stunt: Option<Stunt>, seed: u64) -> Self {
+        Self { stunt: stunt.map(|stunt| (stunt, Stunts::new(seed))), ..self }
     }
 
     /// Flies it. Without a place to fly to it is made ready and stands.
@@ -108,6 +116,10 @@ impl<'a> Pilot<'a> {
             return;
         }
         let clock = self.clock.clone();
+        if let (Some((Stunt::Freestyle(seconds), stunts)), Some(leg)) = (&mut self.stunt, places.0.first()) {
+            let (seconds, stunts) = (*seconds, core::mem::replace(stunts, Stunts::new(0)));
+            self.freestyle(stunts, leg.place, seconds).await;
+        }
         places.fly(&clock, progress, &mut async |place, sinks| self.steer(place, sinks).await).await;
         for sticks in SETTLE {
             self.hold(sticks, 0.5).await;
@@ -120,6 +132,24 @@ impl<'a> Pilot<'a> {
 
     async fn calibrate(&mut self) -> bool {
         self.gesture(CALIBRATE, |lights| lights.calibrating, 2.2).await
+    }
+
+    /// Climbs to a place, and flies stunts there.
+    async fn freestyle(&mut self, mut stunts: Stunts, place: Vec3, seconds: f32) {
+        let acro = core::mem::take(&mut self.acro);
+        let mut begun = None;
+        while begun.is_none_or(|begun| self.clock.now().since(begun).seconds() < seconds) {
+            let seen = self.steer(place, false).await;
+            while let Some(sticks) = stunts.next(&self.eye.look(self.clock.now()), LOOK.seconds()) {
+                begun.get_or_insert(self.clock.now());
+                self.transmitter.set(sticks);
+                self.clock.sleep_until(self.clock.now() + LOOK).await;
+            }
+            if seen.contact && begun.is_some() {
+                return;
+            }
+        }
+        self.acro = acro;
     }
 
     /// Makes a gesture until the lights say that it was seen, and waits for some seconds after it. Was it?
@@ -144,6 +174,13 @@ impl<'a> Pilot<'a> {
     async fn steer(&mut self, place: Vec3, sinks: bool) -> Seen {
         let now = self.clock.now();
         let seen = self.eye.look(now);
+        if let (Some((Stunt::Drop(height), _)), true) = (&self.stunt, sinks)
+            && -seen.position.z < *height
+        {
+            self.transmitter.set(Sticks { acro: self.acro, ..Sticks::REST });
+            self.clock.sleep_until(now + LOOK).await;
+            return seen;
+        }
         let wish = self.hand.steer(&seen, place, sinks);
         let StickParameters { angle_max, rotation_max, .. } = self.meaning;
         let mut lean = wish.lean;

@@ -3,6 +3,7 @@
 //! The document's own vehicle is on a page that it does not print. Its gains say what kind it is: with a share of 0.2 for an error of 1 rad/s they fly a frame that
 //! answers a whole share with 600 rad/s² and a motor's lag of 35 ms. One of 50 g, which answers five times as fast, they shake to pieces.
 
+use crate::airframe::AIRFRAME;
 use crate::parameters::{BatteryParameters, Parameters};
 use stampfly_sim::plant::PlantParameters;
 
@@ -28,6 +29,8 @@ pub const PLANT: PlantParameters = PlantParameters {
     // A propeller of 3 g; a lag of 35 ms at hover.
     rotor_inertia: 4.4e-6,
     manufacturing_spread: 1.0,
+    centre_x: 0.0,
+    centre_y: 0.0,
     drag_horizontal: 0.12,
     drag_vertical: 0.3,
     drag_quadratic: 0.01,
@@ -46,12 +49,14 @@ pub const PLANT: PlantParameters = PlantParameters {
     foot_friction: 0.6,
     corner_offset: 0.09,
     corner_height: 0.02,
+    // Five inches.
+    propeller_radius: 0.0635,
     ground_effect_gain: 0.10,
     ground_effect_height: 0.13,
 };
 
 /// The throttle that carries it, as a share, with a full battery: what a pilot knows of it after the first flight.
-pub const HOVER: f32 = 0.6;
+pub const HOVER: f32 = AIRFRAME.hover;
 
 /// The document's defaults, for two cells.
 #[must_use]

@@ -1,5 +1,6 @@
 //! What decides a flight of the quadcopter.
 
+use super::stunts::Stunt;
 use crate::parameters::Parameters;
 use stampfly_sim::SimulationConfig;
 use stampfly_sim::fault::Fault;
@@ -21,6 +22,8 @@ pub struct Setup {
     pub sticks: Option<Sticks>,
     /// In ACRO, not in ANGLE.
     pub acro: bool,
+    /// What is flown besides.
+    pub stunt: Option<Stunt>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
     /// The inertial sensor is a chip under its driver, and no model of its samples. The radio always is.

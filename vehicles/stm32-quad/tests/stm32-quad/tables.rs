@@ -31,8 +31,10 @@ impl<'b> Bench<'b> {
             self.outside.receiver.receiver_input.publish(self.now, &input);
         }
         if let Some(gyro) = gyro {
-            let accel = Vec3::new(0.0, 0.0, -GRAVITY);
-            self.outside.imu.sensor_imu.publish(self.now, &ImuData { accel, gyro, ..Default::default() });
+            // A sensor that repeats itself does not measure.
+            let noise = Vec3::new(1.0, -1.0, 1.0) * ((self.now.as_micros() / 250 * 7_919 % 101) as f32 - 50.0) * 1e-5;
+            let accel = Vec3::new(0.0, 0.0, -GRAVITY) + noise;
+            self.outside.imu.sensor_imu.publish(self.now, &ImuData { accel, gyro: gyro + noise, ..Default::default() });
         }
         self.flight_loop.run_band(Band::Flight, self.now, &mut ());
         self.flight_loop.run_band(Band::Background, self.now, &mut ());
