@@ -212,7 +212,7 @@ fn a_page_sees_state_and_gets_its_answers() {
             break sample.clone();
         }
     };
-    assert_eq!(sample, json!([Id::flight_status as usize, 1, 0.02, 0, 1, 1, 0, 0, 0, 0, 0]));
+    assert_eq!(sample, json!([Id::flight_status as usize, 1, 0.02, 0, 1, 1, 0, 0, 0, 0, 0, 0]));
 
     send(&mut page, &json!({ "vehicle": 1, "id": 2, "do": "guided", "kind": "arm" }));
     let until = Wall::now() + SOON;

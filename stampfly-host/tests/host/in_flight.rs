@@ -197,13 +197,13 @@ fn spikes_of_the_gyro_end_in_a_landing() {
     }
 }
 
-/// It tipped over, and lay on its back.
+/// It tipped over, and lay on its back. What cannot be trimmed lands.
 #[test]
 fn half_a_propeller_on_the_ground_ends_upright() {
     for motor in 1..=4 {
         let fault = format!("motor-{motor}-thrust@spool");
         let judgement = flown(&setup("arm\ntakeoff 0.5\nhover 2\nland\n", &[&fault])).0.judgement;
-        assert!(judgement.as_expected && judgement.max_height_m < 0.1, "{fault}: {judgement:?}");
+        assert!(judgement.as_expected && judgement.max_height_m < 0.5, "{fault}: {judgement:?}");
         let turned = |name: &str| judgement.alerts.iter().any(|span| span.name == name);
         assert!(!["GYRO_ANOMALY", "IMPACT", "TILT_MISMATCH"].into_iter().any(turned), "{fault}: {judgement:?}");
     }

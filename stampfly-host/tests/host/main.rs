@@ -52,6 +52,7 @@ mod safety_mode;
 mod safety_sensors;
 mod same_number;
 mod set_points;
+mod sound;
 mod sticks;
 mod stm32_quad;
 #[cfg(unix)]

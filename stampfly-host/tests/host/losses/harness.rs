@@ -61,10 +61,20 @@ impl Hands<'_> {
         self.clock.sleep_until(self.clock.now() + Duration::from_seconds(seconds)).await;
     }
 
+    /// What a pilot sees who stands beside it.
+    pub fn truth(&self) -> Truth {
+        self.world.truth_at(self.clock.now())
+    }
+
     /// Sends a command and returns the instant.
     pub fn command(&mut self, kind: GuidedKind) -> Instant {
+        self.command_at(kind, 0.5)
+    }
+
+    /// The same with a height, m.
+    pub fn command_at(&mut self, kind: GuidedKind, height: f32) -> Instant {
         let now = self.clock.now();
-        let position = Vec3::new(0.0, 0.0, -0.5);
+        let position = Vec3::new(0.0, 0.0, -height);
         self.guided.publish(now, GuidedCommand { kind, position, ..Default::default() }).expect("room in the queue");
         now
     }
@@ -165,6 +175,11 @@ impl Seen {
         let mut phases: Vec<(Instant, FlightPhase)> = self.modes.iter().map(|(at, mode)| (*at, mode.phase)).collect();
         phases.dedup_by_key(|(_, phase)| *phase);
         phases
+    }
+
+    /// The highest that it was after `since`, m.
+    pub fn highest(&self, since: Instant) -> f32 {
+        self.truths.iter().filter(|(at, _)| *at >= since).map(|(_, truth)| -truth.position.z).fold(0.0, f32::max)
     }
 
     /// When a state was first entered at or after an instant.

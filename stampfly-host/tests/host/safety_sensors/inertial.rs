@@ -106,7 +106,8 @@ fn an_inertial_sensor_of_half_the_scale_stops_the_motors() {
             let (seen, since) = fly(seed, 14.0, Onset::After(FlightPhase::Flying, 1.0), lies);
             let took = seen.motors_off_after(since);
             println!("{scale}, seed {seed}: {took}");
-            assert!(took <= Duration::from_millis(350), "{scale}, seed {seed}: {took}");
+            // Less than that, and what comes in a hard manoeuvre of a sound vehicle would be taken for it.
+            assert!(took <= Duration::from_secs(2), "{scale}, seed {seed}: {took}");
         }
     }
 }

@@ -94,9 +94,4 @@ impl Seen {
             .find(|(at, active)| *at >= since && active.contains(alert))
             .map(|(at, _)| at.since(since).seconds())
     }
-
-    /// The highest that it was after `since`, m.
-    fn highest(&self, since: Instant) -> f32 {
-        self.truths.iter().filter(|(at, _)| *at >= since).map(|(_, truth)| -truth.position.z).fold(0.0, f32::max)
-    }
 }
