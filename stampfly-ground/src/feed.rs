@@ -114,7 +114,7 @@ mod tests {
         feed.subscribe(vec!["flight_status".into(), "nonsense".into()]);
         let place = Id::flight_status as usize;
         let expected = format!(
-            r#"{{"now":20.5,"state":[[0,0.0000],[1,1.5000,[{place},1,1.500000,5,1,1,0,0,0,0,0]]],"dropped":0}}"#
+            r#"{{"now":20.5,"state":[[0,0.0000],[1,1.5000,[{place},1,1.500000,5,1,1,0,0,0,0,0,0]]],"dropped":0}}"#
         );
         assert_eq!(feed.text(Duration::from_micros(20_500)), expected);
         assert_eq!(

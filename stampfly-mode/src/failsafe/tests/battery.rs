@@ -6,6 +6,7 @@ use super::*;
 fn readings(rig: &mut Rig, list: impl IntoIterator<Item = (f32, f32)>) -> Vec<Alerts> {
     let mut step = |(voltage, current)| {
         rig.battery = PowerData { voltage, current, ..Default::default() };
+        rig.read = Some(rig.now + PERIOD);
         (0..28).map(|_| rig.sample(REST, Vec3::zeros())).last().unwrap_or_default()
     };
     list.into_iter().map(&mut step).collect()
