@@ -98,7 +98,8 @@ fn what_it_runs_into_and_what_its_wheels_do_not_bear_is_a_blow() {
         rig.feels(BLOW_LASTS, force, 0.5).intersects(BLOW)
     };
     assert!(struck(0.5, [-60.0, 0.0, -5.0]), "nose first");
-    assert!(struck(0.5, [-20.0, 12.0, -9.0]), "a wing first");
+    // With every axis at full scale the chip may have no sensor, and 50 ms decide.
+    assert!(struck(0.5, [-20.0, 12.0, -6.0]), "a wing first");
     assert!(struck(0.0, [0.0, 0.0, 9.0]), "on its back");
     assert!(struck(3.5, [0.0, 0.0, -20.0]), "wheels first, and hard");
     assert!(!struck(2.0, [0.0, 0.0, -20.0]), "what its wheels bear");
