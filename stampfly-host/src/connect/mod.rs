@@ -10,6 +10,7 @@
 //! | `talk.rs`, `budget.rs` | what pages are told, and how often |
 //! | `translation.rs` | what a cable says and what those frames say |
 //! | `questions.rs` | parameters and lines, asked until they are answered |
+//! | `unanswered.rs` | commands of programs that wait for the vehicle's answer |
 //! | [`station`] | what pages ask → frames; frames → samples and answers |
 //! | [`Bridge`] | a thread between the line, the page's hub and MAVLink's ports |
 //!
@@ -27,6 +28,7 @@ mod sealed;
 pub mod station;
 mod talk;
 mod translation;
+mod unanswered;
 mod way;
 
 pub use place::{Line, Place, PlaceError};
@@ -59,6 +61,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use talk::Talk;
 use translation::VEHICLE;
+use unanswered::{Unanswered, answer, command};
 use way::{Open, Way};
 
 /// Where other programs find the vehicle.
@@ -109,12 +112,13 @@ struct Program {
     decoder: MavlinkDecoder<MavMessage>,
     /// Whether what it says was held up on its way here.
     pulse: Pulse,
+    unanswered: Unanswered,
 }
 
 impl Program {
     /// One that has come now.
     fn new(now: stampfly_types::Instant) -> Self {
-        Self { decoder: MavlinkDecoder::new(), pulse: Pulse::new(now) }
+        Self { decoder: MavlinkDecoder::new(), pulse: Pulse::new(now), unanswered: Unanswered::default() }
     }
 }
 
@@ -189,6 +193,11 @@ impl<V: Vehicle> Ends<V> {
             Said::Parameter(index, value) => self.parameter(index, value),
             Said::Chunk(chunk) => self.chunk(chunk),
             Said::Frame(frame) => {
+                if frame.id == COMMAND_ACK_DATA::ID
+                    && let Ok(MavMessage::COMMAND_ACK(ack)) = frame.message()
+                {
+                    self.programs.values_mut().for_each(|program| program.unanswered.hears(&ack));
+                }
                 self.programs.keys().for_each(|client| self.ports.send(client, frame.bytes()));
                 if let Some(text) = told(frame) {
                     self.talk.text(self.now, text);
@@ -267,7 +276,8 @@ impl<V: Vehicle> Ends<V> {
             Heard::Opened => drop(programs.insert(client, Program::new(now))),
             Heard::Closed => drop(programs.remove(&client)),
             Heard::Bytes(bytes) | Heard::Late(bytes) => {
-                let Program { decoder, pulse } = programs.entry(client).or_insert_with(|| Program::new(now));
+                let program = programs.entry(client).or_insert_with(|| Program::new(now));
+                let Program { decoder, pulse, unanswered } = program;
                 pulse.lies(matches!(heard, Heard::Late(_)));
                 for byte in bytes {
                     let Some(frame) = decoder.feed(*byte) else { continue };
@@ -291,6 +301,9 @@ impl<V: Vehicle> Ends<V> {
                         answer.into_iter().for_each(|answer| ports.send(&client, answer));
                         continue;
                     };
+                    if let Some(command) = order.as_ref().and_then(command) {
+                        unanswered.asks(command, numbers);
+                    }
                     if is_marked {
                         let said = Instant::now();
                         let said = if pulse.is_held() { said.checked_sub(HELD) } else { Some(said) };
@@ -300,6 +313,18 @@ impl<V: Vehicle> Ends<V> {
                 }
             }
         });
+    }
+
+    /// The line is lost: programs that wait for an answer get one.
+    fn lost(&mut self) {
+        let Self { ports, programs, answers, .. } = self;
+        for (client, program) in programs {
+            for ack in program.unanswered.lost() {
+                let mut room = [0; LONGEST];
+                let bytes = answers.write(MavlinkVersion::V2, &ack, &mut room);
+                bytes.into_iter().for_each(|bytes| ports.send(client, bytes));
+            }
+        }
     }
 
     /// Time has passed: tells pages what is due, and begins a log.
@@ -337,14 +362,8 @@ impl<V: Vehicle> Ends<V> {
 }
 
 /// The answer to a command of a program of these numbers that is not passed on.
-fn refusal(order: &MavMessage, result: MavResult, [target_system, target_component]: [u8; 2]) -> Option<MavMessage> {
-    let command = match order {
-        MavMessage::COMMAND_LONG(data) => data.command,
-        MavMessage::COMMAND_INT(data) => data.command,
-        _ => return None,
-    };
-    let answer = COMMAND_ACK_DATA { command, result, target_system, target_component, ..COMMAND_ACK_DATA::default() };
-    Some(MavMessage::COMMAND_ACK(answer))
+fn refusal(order: &MavMessage, result: MavResult, numbers: [u8; 2]) -> Option<MavMessage> {
+    Some(answer(command(order)?, result, numbers))
 }
 
 /// What the vehicle says of what others have asked it, at this line and elsewhere. Of this station it
@@ -428,6 +447,7 @@ impl<V: Vehicle> Bridge<V> {
                     let Some(why) = why else { break };
                     let Self { station, ends, .. } = &mut self;
                     station.lost(&mut |said| ends.take(said));
+                    ends.lost();
                     self.change(State::Away, format!("the line at {} is gone: {why}", self.way));
                 }
                 Err(error) => self.change(State::Away, format!("nothing at {}: {error}", self.way)),

@@ -1,10 +1,11 @@
-//! The programs that are connected to TCP ports: one thread reads, one writes, and a queue of
-//! bounded length between the flight and the writer, so that a program that reads slowly does not
+//! The programs that are connected to TCP ports: one thread reads, one writes, and an outbox of
+//! bounded size between the flight and the writer, so that a program that reads slowly does not
 //! hold up a flight.
 
 use super::age::Looks;
 use super::events::{Events, POLL};
 use super::greeting::{Foreign, Greeting};
+use super::outbox::{Outbox, Waiting};
 use crate::waited::has_only_waited;
 use stampfly_sim::vehicle::{Client, Heard, PortSpec};
 use std::collections::HashMap;
@@ -12,14 +13,17 @@ use std::fmt;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// Most connections to one port.
 const MOST: usize = 16;
-/// Answers that may wait for a connection to take them.
-const WAITING: usize = 256;
+/// Bytes that may wait for a connection to take them: what a vehicle says in half a minute, which a
+/// line that was held up for so long brings at once.
+const WAITING: usize = 256 * 1024;
+/// Bytes that may wait for a serial line: a program that begins to read wants no old ones.
+#[cfg(unix)]
+const WAITING_LINE: usize = 16 * 1024;
 /// Bytes read at once.
 const PART: usize = 2048;
 
@@ -61,7 +65,7 @@ pub(super) struct Connections {
 /// What waits for one to take it.
 #[derive(Debug)]
 struct Queue {
-    bytes: SyncSender<Vec<u8>>,
+    bytes: Outbox,
     /// The how many-th it is, and whether it has shown that it speaks the port's language.
     number: u64,
     is_shown: bool,
@@ -95,15 +99,15 @@ impl Connections {
     /// serial line loses what no program reads.
     pub fn send(&self, to: &Client, bytes: &[u8]) {
         let mut all = self.queues();
-        if all.get(to).is_some_and(|queue| queue.bytes.try_send(bytes.to_vec()).is_err() && !queue.stays) {
+        if all.get(to).is_some_and(|queue| !queue.bytes.put(bytes) && !queue.stays) {
             all.remove(to);
         }
     }
 
     /// One that is no TCP connection: what is sent to it waits in this queue.
     #[cfg(unix)]
-    pub fn join(&self, client: Client) -> Receiver<Vec<u8>> {
-        let (queue, waiting) = sync_channel(WAITING);
+    pub fn join(&self, client: Client) -> Waiting {
+        let (queue, waiting) = Outbox::new(WAITING_LINE);
         self.queues().insert(client, Queue { bytes: queue, number: 0, is_shown: true, stays: true });
         waiting
     }
@@ -122,7 +126,7 @@ impl Connections {
     }
 
     fn begin(self: &Arc<Self>, client: Client, spec: &'static PortSpec, stream: TcpStream, events: &Events) {
-        let (queue, waiting) = sync_channel(WAITING);
+        let (queue, waiting) = Outbox::new(WAITING);
         let mut all = self.queues();
         let prepared = stream
             .set_nonblocking(false)
@@ -219,8 +223,8 @@ fn read(
 
 /// Ends when the queue's other end is gone and everything in it is written, or the program takes no
 /// more.
-fn write(mut stream: TcpStream, waiting: &Receiver<Vec<u8>>) {
-    while let Ok(bytes) = waiting.recv() {
+fn write(mut stream: TcpStream, waiting: &Waiting) {
+    while let Some(bytes) = waiting.next() {
         if stream.write_all(&bytes).is_err() {
             break;
         }

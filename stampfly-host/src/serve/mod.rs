@@ -16,6 +16,7 @@ mod flight_log;
 mod greeting;
 mod key;
 mod option;
+mod outbox;
 mod ports;
 mod record;
 mod terminal;
