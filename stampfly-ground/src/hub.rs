@@ -34,7 +34,7 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::io::{self, Read};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Asks that wait for one vehicle.
@@ -185,10 +185,25 @@ struct Shared {
     log: Mutex<Option<Arc<LogSource>>>,
     /// Who commands, as pages were told last.
     commander: Mutex<Value>,
+    /// Card and commander as a text, until one of them changes. To make it anew for each page takes a
+    /// megabyte for a moment, in every page's thread.
+    introduction: Mutex<Option<Arc<str>>>,
     /// Clients that have gone, and that the vehicle was not told of.
     gone: Mutex<Vec<Client>>,
     /// Sticks that found the queue full.
     sticks_lost: AtomicU64,
+}
+
+impl Shared {
+    fn introduction(&self, number: usize) -> Arc<str> {
+        let mut text = lock(&self.introduction);
+        let made = text.get_or_insert_with(|| {
+            let mut card = lock(&self.card).json(number);
+            card["commander"] = lock(&self.commander).clone();
+            card.to_string().into()
+        });
+        made.clone()
+    }
 }
 
 /// See the module.
@@ -225,6 +240,7 @@ impl Hub {
                 asks: Mutex::default(),
                 log: Mutex::default(),
                 commander: Mutex::new(json!({ "who": "", "page": null })),
+                introduction: Mutex::default(),
                 gone: Mutex::default(),
                 sticks_lost: AtomicU64::new(0),
             }
@@ -310,6 +326,9 @@ impl Hub {
         }
         if let Event::Commander { who, page } = event {
             *lock(&shared.commander) = json!({ "who": who, "page": page });
+        }
+        if matches!(event, Event::Parameter { .. } | Event::Commander { .. }) {
+            *lock(&shared.introduction) = None;
         }
         let mut body = serde_json::to_value(event).unwrap_or_default();
         body["vehicle"] = vehicle.into();
@@ -438,17 +457,15 @@ impl Hub {
     /// The first thing a page is told.
     #[must_use]
     pub fn hello(&self, page: Client, session: &str, now: Duration) -> String {
-        let cards = self.vehicles.iter().enumerate().map(|(number, shared)| {
-            let mut card = lock(&shared.card).json(number);
-            card["commander"] = lock(&shared.commander).clone();
-            card
-        });
-        let cards: Vec<Value> = cards.collect();
-        let (version, words) = (env!("CARGO_PKG_VERSION"), card::words());
-        let (page, now) = (page.number(), now.as_secs_f64() * 1e3);
-        let page = json!({ "number": page, "session": session });
-        json!({ "hello": { "version": version, "page": page, "now": now, "vehicles": cards, "words": words } })
-            .to_string()
+        static WORDS: LazyLock<String> = LazyLock::new(|| card::words().to_string());
+        let vehicles: Vec<_> =
+            self.vehicles.iter().enumerate().map(|(number, shared)| shared.introduction(number)).collect();
+        let (vehicles, words, version) = (vehicles.join(","), &*WORDS, env!("CARGO_PKG_VERSION"));
+        let page = json!({ "number": page.number(), "session": session });
+        let now = json!(now.as_secs_f64() * 1e3);
+        format!(
+            r#"{{"hello":{{"version":"{version}","page":{page},"now":{now},"vehicles":[{vehicles}],"words":{words}}}}}"#
+        )
     }
 
     /// Of each vehicle: its newest samples, and what their words mean.

@@ -28,7 +28,7 @@ SLOW_READERS = 16
 DOWNLOADS = 8
 DATAGRAMS = 1_000
 TOPICS = ["estimate_state", "flight_status", "sensor_power", "system_alert"]
-# Memory and disk may grow by so much after the first minute.
+# Memory may grow by so much from before the load on, and the disk may hold as much.
 GROWTH = 20 << 20
 # A second of the watched time in which fewer texts or messages came than this counts as a gap.
 FEWEST = 15
@@ -136,6 +136,13 @@ class Station:
                 self.line.mav.param_request_read_send(1, 1, b"rate.roll.kp", -1)
 
 
+async def topics(port: int) -> list[str]:
+    """Every topic that the vehicle has."""
+    address = f"127.0.0.1:{port}"
+    async with websockets.connect(f"ws://{address}/ws", origin=f"http://{address}", max_size=None) as line:
+        return [topic["name"] for topic in json.loads(await line.recv())["hello"]["vehicles"][0]["topics"]]
+
+
 async def page(port: int, until: float, counts: list[int]) -> None:
     """A page: the state, twenty times a second."""
     address = f"127.0.0.1:{port}"
@@ -152,17 +159,21 @@ async def page(port: int, until: float, counts: list[int]) -> None:
                 await line.send(json.dumps({"vehicle": 0, "id": 0, "do": "alive"}))
 
 
-def slow_reader(port: int, until: float) -> None:
+def slow_reader(port: int, until: float, names: list[str]) -> None:
     """A page that asks for everything and reads ten bytes a second. It comes again when it is closed."""
     head = (
         f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
     )
-    text = json.dumps({"id": 1, "do": "subscribe", "topics": [], "rate": 50}).encode()
-    frame = bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text
+    text = json.dumps({"id": 1, "do": "subscribe", "topics": names, "rate": 50}).encode()
+    frame = bytes([0x81, 0xFE]) + len(text).to_bytes(2, "big") + bytes(4) + text
     while time.monotonic() < until:
         try:
-            with socket.create_connection(("127.0.0.1", port), 5) as line:
+            with socket.socket() as line:
+                # As little as the system gives, so that what is not read waits in the program.
+                line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+                line.settimeout(5)
+                line.connect(("127.0.0.1", port))
                 line.sendall(head.encode())
                 line.sendall(frame)
                 while time.monotonic() < until and line.recv(10):
@@ -214,23 +225,24 @@ def main() -> None:
         http, station = serving.port("http"), Station(serving.port("mavlink-tcp"))
         _, vehicle = serving.stations.recvfrom(2_000)
         station.hop()
-        until = time.monotonic() + seconds
         totals, sent, gaps, waited, counts = [0, 0], [0], [], [], []
-        jobs = [(slow_reader, http, until)] * SLOW_READERS + [(download, http, until, totals)] * DOWNLOADS
+        # The log of the flight is written for some seconds after it.
+        time.sleep(20)
+        names = asyncio.run(topics(http))
+        until = time.monotonic() + seconds
+        memory, disk, begun = serving.memory(), serving.disk(), serving.processor()
+        jobs = [(slow_reader, http, until, names)] * SLOW_READERS + [(download, http, until, totals)] * DOWNLOADS
         numbers = [serving.port(name) for name in UDP] + [vehicle[1]]
         jobs += [(garbage, number, until, seed, sent) for seed, number in enumerate(numbers)]
         jobs += [(station.watch, until, gaps, waited), (lambda: asyncio.run(page(http, until, counts)),)]
         threads = [threading.Thread(target=job[0], args=job[1:], daemon=True) for job in jobs]
         for thread in threads:
             thread.start()
-        settled = min(60.0, seconds / 3)
-        time.sleep(settled)
-        memory, disk, begun = serving.memory(), serving.disk(), serving.processor()
         most = [memory, disk]
         while time.monotonic() < until - 1:
             time.sleep(1)
             most = [max(most[0], serving.memory()), max(most[1], serving.disk())]
-        busy = (serving.processor() - begun) / (seconds - settled)
+        busy = (serving.processor() - begun) / seconds
         for thread in threads:
             thread.join(30)
         assert serving.process.poll() is None, "the program has ended"
@@ -244,7 +256,7 @@ def main() -> None:
         "station_attitudes_per_s": sum(gaps) / len(gaps),
         "station_seconds_with_gaps": sum(count < FEWEST for count in gaps),
         "station_longest_wait_s": max(waited),
-        "memory_at_first_bytes": memory,
+        "memory_before_bytes": memory,
         "memory_growth_bytes": most[0] - memory,
         "disk_bytes": most[1],
         "disk_growth_bytes": most[1] - disk,
@@ -260,7 +272,7 @@ def main() -> None:
     assert figures["station_attitudes_per_s"] >= 0.95 * RATE, "the station was served too seldom"
     assert figures["station_longest_wait_s"] <= 1.0, "a question waited for more than a second"
     assert figures["memory_growth_bytes"] <= GROWTH, "memory grows"
-    assert figures["disk_growth_bytes"] <= GROWTH, "disk grows"
+    assert figures["disk_bytes"] <= GROWTH, "disk grows"
     assert figures["datagrams_per_s"] >= 0.9 * DATAGRAMS * len(numbers), "this machine could not send as much"
 
 
