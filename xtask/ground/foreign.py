@@ -2,9 +2,11 @@
 
     foreign.py PROGRAM FOLDER
 
-The page sends what would arm the vehicle and change a parameter, in every language, with `fetch`, a form with a file, a form with text, and a WebSocket: first to the
-ports of `stampfly serve`, then to those of `stampfly connect`, behind which is another vehicle. Nothing may change, and every connection to a port
-that does not speak HTTP is counted. Exit code 0, or an exception that says what is not as it should be.
+The page sends what would arm the vehicle, stop its motors and change parameters, in every language, with
+`fetch`, a form with a file, a form with text, and a WebSocket: first to the ports of `stampfly serve`, then to
+those of `stampfly connect`, behind which is another vehicle; while the vehicle stands, and while it flies by the
+station's own page. Nothing may change, and every connection to a port that does not speak HTTP is counted. Exit
+code 0, or an exception that says what is not as it should be.
 """
 
 import base64
@@ -94,8 +96,10 @@ def payload(repeats: int) -> bytes:
     gain = frame(23, struct.pack("<fBB16sB", 0.00045, 1, 1, PARAMETER.encode(), 9))
     arm = frame(76, struct.pack("<7fHBBB", 1, 0, 0, 0, 0, 0, 0, 400, 1, 1, 0))
     rise = frame(76, struct.pack("<7fHBBB", 0, 0, 0, 0, 0, 0, 1, 22, 1, 1, 0))
-    typed = f"\r\nparam set {PARAMETER} 0.00045\r\n".encode()
-    return (heartbeat + gain + arm + rise + typed + question(200, struct.pack("<8H", *[1500] * 8))) * repeats
+    kill = frame(76, struct.pack("<7fHBBB", 0, 21196, 0, 0, 0, 0, 0, 400, 1, 1, 0))
+    typed = f"\r\nparam set {PARAMETER} 0.00045\r\nkill\r\n".encode()
+    gains = question(202, bytes([1, 1, 1] * 10))
+    return (heartbeat + gain + arm + rise + kill + typed + gains) * repeats
 
 
 class Site(http.server.BaseHTTPRequestHandler):
@@ -152,6 +156,20 @@ def unchanged(page: Page, kp: float) -> None:
     assert gain(page) == kp, "the other site has changed a parameter"
 
 
+def take_off(page: Page) -> None:
+    page.click("#tab-fly")
+    page.click("#arm")
+    until("the vehicle is armed", lambda: text(page, "armed") == "ARMED")
+    page.fill("#height", "0.6")
+    page.click("#take-off")
+    until("the vehicle hovers", lambda: figure(page, "height") > 0.5)
+
+
+def flies(page: Page) -> None:
+    page.wait_for_timeout(1500)
+    assert text(page, "armed") == "ARMED" and figure(page, "height") > 0.3, "the other site has ended the flight"
+
+
 def gain(page: Page) -> float:
     page.click("#tab-parameters")
     page.fill("#parameter-search", PARAMETER)
@@ -178,6 +196,16 @@ def attacked(context: BrowserContext, program: Program, ports: list[str], site: 
             foreign.evaluate("([port, body, lines]) => attack(port, body, lines)", [program.port(name), body, lines])
             attempts += 4 if name != "http" else 0
             unchanged(own, before)
+    take_off(own)
+    for name in ports:
+        foreign.goto(site)
+        body = base64.b64encode(payload(1)).decode()
+        foreign.evaluate("([port, body, lines]) => attack(port, body, lines)", [program.port(name), body, "\nkill\n"])
+        attempts += 4 if name != "http" else 0
+        flies(own)
+    own.click("#land")
+    until("the vehicle has landed", lambda: text(own, "armed") == "disarmed")
+    unchanged(own, before)
     foreign.close()
     own.close()
     return attempts
