@@ -83,6 +83,8 @@ pub struct Battery {
     current: f64,
     polarisation: f64,
     voltage: f64,
+    /// Without load, at the present state of charge.
+    open_circuit: f64,
     cells: f64,
     initial: f64,
     capacity: f64,
@@ -100,6 +102,7 @@ impl Battery {
             current: 0.0,
             polarisation: 0.0,
             voltage: cells * OPEN_CIRCUIT[10],
+            open_circuit: cells * OPEN_CIRCUIT[10],
             cells,
             initial: charge,
             capacity: capacity * 3600.0,
@@ -117,6 +120,7 @@ impl Battery {
             current: 0.0,
             polarisation: 0.0,
             voltage: 0.0,
+            open_circuit: 0.0,
             cells: spec.cells,
             initial: spec.charge,
             capacity: spec.capacity * 3600.0,
@@ -132,19 +136,19 @@ impl Battery {
     /// the battery gives, V.
     #[must_use]
     pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
-        let source = self.open_circuit() - self.polarisation - self.resistance * idle;
-        let mut voltage = source;
+        let source = self.open_circuit - self.polarisation - self.resistance * idle;
+        let (mut voltage, mut drew) = (source, usize::MAX);
         // Linear for the loads that draw. Without one that does not the voltage is lower, so that
-        // none comes back: no more passes than loads.
-        for _ in 0..=loads.len() {
+        // none comes back: as many that draw are the same ones, and no more passes than loads.
+        loop {
             let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
-            let (conductance, back) =
-                drawing.fold((0.0, 0.0), |(sum, back), load| (sum + load.conductance, back + load.back));
-            let solved = (source + self.resistance * back) / (1.0 + self.resistance * conductance);
-            if solved == voltage {
+            let (count, conductance, back) = drawing
+                .fold((0, 0.0, 0.0), |(count, sum, back), load| (count + 1, sum + load.conductance, back + load.back));
+            if count >= drew {
                 break;
             }
-            voltage = solved;
+            drew = count;
+            voltage = (source + self.resistance * back) / (1.0 + self.resistance * conductance);
         }
         voltage.max(0.0)
     }
@@ -154,7 +158,8 @@ impl Battery {
         self.current = current;
         self.drawn += current * dt;
         self.polarisation += (current * self.slow_resistance - self.polarisation) * (dt / self.time_constant);
-        self.voltage = (self.open_circuit() - current * self.resistance - self.polarisation).max(0.0);
+        self.open_circuit = self.at_rest();
+        self.voltage = (self.open_circuit - current * self.resistance - self.polarisation).max(0.0);
     }
 
     /// Terminal voltage under the present load, volts.
@@ -184,6 +189,11 @@ impl Battery {
     /// Voltage without load at the present state of charge, volts.
     #[must_use]
     pub fn open_circuit(&self) -> f64 {
+        self.open_circuit
+    }
+
+    /// By the discharge curve.
+    fn at_rest(&self) -> f64 {
         let position = self.charge().min(1.0) * 10.0;
         let below = (position as usize).min(9);
         let (low, high) = (OPEN_CIRCUIT[below], OPEN_CIRCUIT[below + 1]);

@@ -28,6 +28,8 @@ pub struct Ground {
     /// Middles of the propellers, and their radius; none that can touch with a radius of 0.
     hubs: [Vector3<f64>; ROTORS],
     radius: f64,
+    /// Distance of the farthest place of a propeller from the origin.
+    span: f64,
     /// Distance of the farthest point from the origin.
     reach: f64,
     stiffness: f64,
@@ -56,6 +58,7 @@ impl Ground {
             scrapes: 0,
             hubs,
             radius: p.propeller_radius,
+            span: hubs.iter().map(Vector3::norm).fold(0.0, f64::max) + p.propeller_radius,
             points,
             reach: points.iter().map(Vector3::norm).fold(0.0, f64::max),
             stiffness: p.foot_stiffness,
@@ -92,7 +95,7 @@ impl Ground {
         scene: &Scene,
     ) -> [bool; ROTORS] {
         let corners = self.anchors.iter().skip(FEET).any(Option::is_some);
-        let is_high = scene.slope == [0.0; 2] && -position.z - scene.highest() > self.hubs[0].norm() + self.radius;
+        let is_high = scene.slope == [0.0; 2] && -position.z - scene.highest() > self.span;
         let is_free = self.radius <= 0.0 || is_high;
         if is_free {
             self.scrapes += u64::from(corners);

@@ -15,7 +15,7 @@ use crate::VehicleConfig;
 use crate::airframe::AIRFRAME;
 use stampfly_sim::Truth;
 use stampfly_types::messages::{ControlOutput, MotorOutput, StateEstimate};
-use stampfly_types::{Duration, Instant, Vec3, math};
+use stampfly_types::{Duration, Instant, Quat, Vec3, frame, math};
 use std::collections::VecDeque;
 
 /// Over this time the rates are compared with the torque: five lags of the motors, so that a step
@@ -43,10 +43,21 @@ pub(super) struct State {
     pub height: f32,
     /// m/s.
     pub speed: f32,
+    attitude: Quat,
+    /// Cosine of the angle between the true vertical and the estimated one.
+    cos_error: f32,
+}
+
+impl State {
     /// rad.
-    pub tilt: f32,
+    pub fn tilt(&self) -> f32 {
+        frame::tilt(&self.attitude)
+    }
+
     /// Between the true vertical and the estimated one, rad.
-    pub attitude_error: f32,
+    pub fn attitude_error(&self) -> f32 {
+        math::acos(self.cos_error)
+    }
 }
 
 /// A step of the comparison: rates, and what the torque has made of them since the beginning,
@@ -59,7 +70,7 @@ struct Turned {
 }
 
 pub(super) struct Soundness {
-    tilt_mismatch: f32,
+    cos_mismatch: f32,
     battery_critical: f32,
     estimate: StateEstimate,
     torque: Vec3,
@@ -78,7 +89,7 @@ pub(super) struct Soundness {
 impl Soundness {
     pub fn new(config: &VehicleConfig) -> Self {
         Self {
-            tilt_mismatch: config.failsafe.tilt_mismatch,
+            cos_mismatch: math::cos(config.failsafe.tilt_mismatch),
             battery_critical: config.failsafe.battery_critical,
             estimate: StateEstimate::default(),
             torque: Vec3::zeros(),
@@ -116,10 +127,9 @@ impl Soundness {
         if truth.contact || strikes > self.strikes {
             (self.touched, self.strikes) = (Some(now), strikes);
         }
-        let up = |attitude: &stampfly_types::Quat| attitude.inverse() * Vec3::new(0.0, 0.0, -1.0);
-        let cos = up(&truth.attitude).dot(&up(&self.estimate.attitude)).clamp(-1.0, 1.0);
-        let attitude_error = math::acos(cos);
-        let cos_tilt = stampfly_types::frame::cos_tilt(&truth.attitude);
+        let up = |attitude: &Quat| attitude.inverse() * Vec3::new(0.0, 0.0, -1.0);
+        let cos_error = up(&truth.attitude).dot(&up(&self.estimate.attitude)).clamp(-1.0, 1.0);
+        let cos_tilt = frame::cos_tilt(&truth.attitude);
         if clearance > REACH * cos_tilt {
             self.out_of_reach = Some(now);
         }
@@ -127,12 +137,12 @@ impl Soundness {
         self.touches = touched;
         let carried = truth.battery_voltage > self.battery_critical;
         self.state = State {
-            sound: follows && attitude_error < self.tilt_mismatch && !touched && carried && !faulty,
+            sound: follows && cos_error > self.cos_mismatch && !touched && carried && !faulty,
             sees_floor: self.out_of_reach.is_none_or(|out| now.since(out) > IN_REACH),
             height: clearance,
             speed: truth.velocity.norm(),
-            tilt: stampfly_types::frame::tilt(&truth.attitude),
-            attitude_error,
+            attitude: truth.attitude,
+            cos_error,
         };
     }
 
