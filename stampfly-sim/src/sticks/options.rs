@@ -16,8 +16,9 @@ const HEIGHTS: [f32; 2] = [0.3, 20.0];
 const HOVER: f32 = 0.9;
 /// A throttle stick below this is at its lowest: a trim and some noise above it.
 const LOWEST: f32 = -0.9;
-/// A recording that begins on the ground has its throttle there for this long.
-const LOW_FOR: Duration = Duration::from_secs(1);
+/// A recording that begins on the ground has its throttle there for this long: many begin with the
+/// arming, a moment before the throttle is raised. A vehicle that is flown does not begin to fall.
+const LOW_FOR: Duration = Duration::from_millis(100);
 /// The hover throttle of a file, measured in it.
 const MEDIAN: &str = "median";
 
@@ -147,7 +148,7 @@ impl Sticks {
     }
 }
 
-/// Is the throttle at its lowest from the first row on, for a second?
+/// Is the throttle at its lowest from the first row on, for [`LOW_FOR`]?
 fn begins_low(file: &StickFile) -> bool {
     let begins = file.first().at;
     let first = |row: &&Row| row.at.as_micros() < begins.as_micros() + LOW_FOR.as_micros();
@@ -169,8 +170,8 @@ mod tests {
         let start = |options: &StickOptions| Sticks::new(options, None, THROTTLE).expect("sticks").start;
         let [ground, low, high] = [
             "0,-1,0,0,0,acro,0\n9,-1,0,0,0,acro,1",
-            "0,-1,0,0,0,acro,1\n1,0.5,0,0,0,acro,1",
-            "0,-1,0,0,0,acro,1\n0.98,-0.4,0,0,0,acro,1",
+            "0,-1,0,0,0,acro,1\n0.1,0.5,0,0,0,acro,1",
+            "0,-1,0,0,0,acro,1\n0.08,-0.4,0,0,0,acro,1",
         ]
         .map(options);
         assert_eq!([&ground, &low, &high].map(start), [Start::PowerOn, Start::Armed, Start::Height(START_HEIGHT)]);
