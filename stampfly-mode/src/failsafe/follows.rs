@@ -56,9 +56,14 @@ impl FollowsMonitor {
     pub(super) fn step(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, asked: &ControlOutput) -> bool {
         let dt = self.last.replace(at).map_or(0.0, |last| math::smaller(at.since(last).seconds(), LONGEST_STEP));
         let (torque, inertia) = (asked.torque.to_array(), config.inertia.to_array());
+        let lag = dt / (config.motor_lag + dt);
+        let (kept, mean) = (CHANGE / (CHANGE + dt), dt / (MEAN + dt));
         let [mut square, mut product] = [0.0; 2];
         for (place, (axis, rate)) in self.axes.iter_mut().zip(imu.gyro.to_array()).enumerate() {
-            let [made, measured] = axis.step(torque[place], inertia[place], config.motor_lag, rate, dt);
+            axis.torque += (torque[place] - axis.torque) * lag;
+            let last = core::mem::replace(&mut axis.rate, rate);
+            let turned = [axis.torque / inertia[place] * dt, if dt > 0.0 { rate - last } else { 0.0 }];
+            let [made, measured] = axis.change(turned, kept, mean);
             square += made * made;
             product += made * measured;
         }
@@ -70,14 +75,12 @@ impl FollowsMonitor {
 }
 
 impl Axis {
-    /// The changes of the rate, less their means: what the torque makes, and what is measured.
-    fn step(&mut self, torque: f32, inertia: f32, lag: f32, rate: f32, dt: f32) -> [f32; 2] {
-        self.torque += (torque - self.torque) * (dt / (lag + dt));
-        let last = core::mem::replace(&mut self.rate, rate);
-        let steps = [self.torque / inertia * dt, if dt > 0.0 { rate - last } else { 0.0 }];
-        for ((change, mean), step) in self.changes.iter_mut().zip(&mut self.means).zip(steps) {
-            *change = (*change + step) * (CHANGE / (CHANGE + dt));
-            *mean += (*change - *mean) * (dt / (MEAN + dt));
+    /// The changes of the rate, less their means: what the torque makes, and what is measured. `turned`: of both since
+    /// the last step. So much of a change is kept, and so much of it goes into its mean.
+    fn change(&mut self, turned: [f32; 2], kept: f32, mean: f32) -> [f32; 2] {
+        for (place, turned) in turned.into_iter().enumerate() {
+            self.changes[place] = (self.changes[place] + turned) * kept;
+            self.means[place] += (self.changes[place] - self.means[place]) * mean;
         }
         core::array::from_fn(|place| self.changes[place] - self.means[place])
     }
