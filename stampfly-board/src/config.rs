@@ -78,6 +78,10 @@ pub struct VehicleConfig {
     pub corrections: Corrections,
     /// May packets that authenticate nobody fly it?
     pub accept_unauthenticated: bool,
+    /// Protections stop no motors in the air: a simulated flight, to find out whether they were right to. No firmware has it.
+    #[cfg(feature = "simulation")]
+    #[serde(skip)]
+    pub flies_on: bool,
 }
 
 impl Default for VehicleConfig {
@@ -122,6 +126,8 @@ impl Default for VehicleConfig {
             button: ButtonConfig::default(),
             corrections: Corrections::default(),
             accept_unauthenticated: true,
+            #[cfg(feature = "simulation")]
+            flies_on: false,
         }
     }
 }

@@ -7,7 +7,11 @@ use crate::topics::ModeEnds;
 use heapless::Vec;
 use stampfly_bus::{Activation, Runnable, Stamped};
 use stampfly_mode::{ModeConfig, ModeInput, ModeMachine};
-use stampfly_types::messages::{ArmRefusals, ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput};
+#[cfg(feature = "simulation")]
+use stampfly_mode::{decision::CUT, transitions::is_airborne};
+use stampfly_types::messages::{
+    Alerts, ArmRefusals, ButtonGesture, EstimatorCommand, FlightStatus, GuidedKind, PilotInput,
+};
 use stampfly_types::{Duration, Instant};
 
 /// State management: alerts, commands and facts in, the vehicle's state out.
@@ -25,6 +29,10 @@ pub struct Mode {
     last: FlightStatus,
     /// When the vehicle was last armed.
     armed_at: Instant,
+    /// Protections stop no motors in the air. Not in key frames, which a board writes as well.
+    #[cfg(feature = "simulation")]
+    #[serde(skip)]
+    flies_on: bool,
 }
 
 impl Mode {
@@ -41,7 +49,22 @@ impl Mode {
             refused: 0,
             last: FlightStatus::default(),
             armed_at: Instant::ZERO,
+            #[cfg(feature = "simulation")]
+            flies_on: config.flies_on,
         }
+    }
+
+    /// What protections have found, as the mode machine is told it: the alerts, and whether the motors were cut off.
+    #[cfg(not(feature = "simulation"))]
+    const fn protections(&self, alerts: Alerts, cut_off: bool) -> (Alerts, bool) {
+        (alerts, cut_off)
+    }
+
+    /// The same. In the air of a flight that is to fly on, nothing of what stops motors.
+    #[cfg(feature = "simulation")]
+    fn protections(&self, alerts: Alerts, cut_off: bool) -> (Alerts, bool) {
+        let masked = self.flies_on && is_airborne(self.last.phase);
+        if masked { (alerts.without(CUT), false) } else { (alerts, cut_off) }
     }
 }
 
@@ -64,8 +87,10 @@ impl Runnable for Mode {
         let pairing = Some(ends.pairing_request.get().wanted).filter(|_| ends.pairing_request.is_new());
         let pairing = pairing.filter(|wanted| *wanted != self.last.pairing && !self.last.armed);
         let button = button.or(pairing.map(|_| ButtonGesture::HoldPair));
+        // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
+        let (alerts, cut_off) = self.protections(ends.system_alert.get().active, ends.cutoff_state.get().tripped);
         let input = ModeInput {
-            alerts: ends.system_alert.get().active,
+            alerts,
             estimate: ends.estimate_state.get(),
             calibration: ends.calibration.get(),
             land_detected: ends.land_detected.get(),
@@ -77,8 +102,7 @@ impl Runnable for Mode {
             sticks: present(ends.command_setpoint.sample(), now).source,
             commands: &commands,
             button,
-            // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
-            cut_off: ends.cutoff_state.get().tripped,
+            cut_off,
         };
         let output = self.machine.step(now, &input);
         ends.flight_status.publish(now, &output.flight_status);

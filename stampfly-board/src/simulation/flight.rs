@@ -10,6 +10,7 @@ use super::outcome::Outcome;
 use super::pilot::{Meaning, Pilot, approach};
 use super::radio::Radio;
 use super::sensing::{self, Healths, Others, Sensing, Shared};
+use super::settings::Settings;
 use super::setup::Setup;
 use super::watch::Watch;
 use crate::console::Profile;
@@ -165,9 +166,17 @@ impl vehicle::Surroundings for Surroundings {
             (None, Some(sticks), _) => {
                 tasks.spawn(Pilot::new(radio, world, home, meaning, approach(sticks)).play(sticks, waits, progress));
             }
-            (None, None, None) => tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress)),
-            (None, None, Some(mode)) => {
-                tasks.spawn(Pilot::new(radio, world, home, meaning, mode).fly(&setup.mission, waits, progress));
+            (None, None, pilot) => {
+                let settings = Settings::new(&setup.vehicle, console, &seen.changed);
+                match pilot {
+                    None => {
+                        tasks.spawn(ground_station::fly(radio, &setup.mission, waits, progress, Some(settings)));
+                    }
+                    Some(mode) => {
+                        let pilot = Pilot::new(radio, world, home, meaning, mode).with_settings(settings);
+                        tasks.spawn(pilot.fly(&setup.mission, waits, progress));
+                    }
+                }
             }
         }
         // What people break on purpose is not judged.
@@ -197,6 +206,7 @@ impl vehicle::Surroundings for Surroundings {
             duties: motors.1.actuator_motor,
             motors: motors.0,
             watchdog,
+            flies_on: setup.vehicle.flies_on,
             cutoff: cutoff.cutoff_state,
             is_cut_off: false,
             signals: indicator.1.signal,
@@ -236,6 +246,8 @@ pub struct Around<'a> {
     duties: topics::ActuatorMotorRx<'a>,
     motors: MotorModel,
     watchdog: &'a Watchdog,
+    /// The cut-off stops no motors.
+    flies_on: bool,
     cutoff: topics::CutoffStateTx<'a>,
     is_cut_off: bool,
     signals: topics::SignalRx<'a>,
@@ -258,7 +270,7 @@ impl vehicle::Around for Around<'_> {
         {
             self.watchdog.feed(now, output.data.armed);
             // Motors that were cut off get their pins back when the vehicle is disarmed.
-            let off = self.watchdog.has_expired() && (output.data.armed || !self.watchdog.reset());
+            let off = self.watchdog.has_expired() && (output.data.armed || !self.watchdog.reset()) && !self.flies_on;
             self.write(now, &MotorOutput { armed: output.data.armed && !off, ..output.data });
         }
     }
@@ -270,7 +282,7 @@ impl vehicle::Around for Around<'_> {
     fn show(&mut self, now: Instant) {
         self.wrong.act(now, &self.world, self.chips.as_ref());
         let expired = self.watchdog.expired(|| now);
-        if expired {
+        if expired && !self.flies_on {
             self.write(now, &MotorOutput::default());
         }
         if self.is_cut_off != expired {

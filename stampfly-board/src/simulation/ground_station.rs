@@ -5,6 +5,7 @@
 
 use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
+use super::settings::Settings;
 use crate::airframe::AIRFRAME;
 use crate::messages::TelemetryFrame;
 use stampfly_control::autotune::{AutotuneAxis, AutotuneConfig};
@@ -76,8 +77,14 @@ impl Station<'_> {
 }
 
 /// Flies the mission. A place that cannot be reached is given up. With `waits`, two seconds pass between the vehicle's
-/// permission to arm and arming.
-pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Progress) {
+/// permission to arm and arming. Without `settings` no parameter is changed.
+pub async fn fly(
+    radio: Radio<'_>,
+    mission: &Mission,
+    waits: bool,
+    progress: &Progress,
+    mut settings: Option<Settings<'_>>,
+) {
     let mut link = Station { radio, looks: 0 };
     let ready = |frame: &TelemetryFrame| frame.phase == FlightPhase::IdleGround && frame.blocks.is_empty();
     let mut yaw = 0.0f32;
@@ -115,13 +122,7 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
             }
             Step::Hover { seconds } => link.wait(Duration::from_seconds(seconds)).await,
             Step::Flip { direction } => {
-                let kind = match direction {
-                    FlipDirection::Left => GuidedKind::FlipLeft,
-                    FlipDirection::Right => GuidedKind::FlipRight,
-                    FlipDirection::Forward => GuidedKind::FlipForward,
-                    FlipDirection::Back => GuidedKind::FlipBack,
-                };
-                link.send(GuidedCommand { kind, ..Default::default() }).await;
+                link.send(GuidedCommand { kind: turning_over(direction), ..Default::default() }).await;
                 for _ in 0..ROUND_TRIP {
                     link.look().await;
                 }
@@ -139,6 +140,13 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
                 link.wait(longest).await;
                 link.send(GuidedCommand { kind: GuidedKind::Hold, ..Default::default() }).await;
             }
+            Step::Set { index, value } => {
+                // A refusal is seen: the parameter's moment never comes.
+                let now = link.radio.clock().now();
+                let _ = settings.as_mut().map(|settings| settings.set(now, index, value));
+            }
+            // A program has no switch and no stick.
+            Step::Mode { .. } | Step::Chop { .. } => {}
             Step::Land => {
                 link.send(GuidedCommand { kind: GuidedKind::Land, ..Default::default() }).await;
                 link.wait_for(|frame| !frame.armed).await;
@@ -149,5 +157,15 @@ pub async fn fly(radio: Radio<'_>, mission: &Mission, waits: bool, progress: &Pr
     progress.finished.set(true);
     loop {
         link.look().await;
+    }
+}
+
+/// The command that asks to turn over this way.
+pub(super) fn turning_over(direction: FlipDirection) -> GuidedKind {
+    match direction {
+        FlipDirection::Left => GuidedKind::FlipLeft,
+        FlipDirection::Right => GuidedKind::FlipRight,
+        FlipDirection::Forward => GuidedKind::FlipForward,
+        FlipDirection::Back => GuidedKind::FlipBack,
     }
 }

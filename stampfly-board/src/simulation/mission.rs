@@ -8,6 +8,9 @@
 //! hover SECONDS
 //! flip left|right|forward|back
 //! autotune roll|pitch|yaw
+//! mode stabilize|acro|althold|poshold
+//! chop SECONDS
+//! set PARAMETER VALUE
 //! land
 //! ```
 //!
@@ -17,11 +20,18 @@
 //! the motors may turn, `takeoff` when the vehicle flies, `goto` when it has arrived and dwelt, `flip` when it
 //! flies on, `autotune` when its time is over, `land` when it stands
 //! and is disarmed. A place that cannot be reached is given up after [`LONGEST_LEG`].
+//!
+//! `mode` and `chop` are a pilot's: the mode switch is turned, the throttle stick is pulled to its lowest for so long and then
+//! caught. A program has neither, and passes over them. `flip` and `autotune` are a program's; a pilot in a mode that holds
+//! height has one at hand to turn over, and passes over `autotune`.
 
+use super::pilot;
+use crate::parameters;
 use stampfly_control::autotune::AutotuneAxis;
 use stampfly_sim::Noise;
+use stampfly_sim::fault::Moment;
 use stampfly_types::Duration;
-use stampfly_types::messages::FlipDirection;
+use stampfly_types::messages::{FlightMode, FlipDirection};
 use std::fmt;
 use std::string::String;
 use std::vec::Vec;
@@ -67,6 +77,23 @@ pub enum Step {
         /// Which one.
         axis: AutotuneAxis,
     },
+    /// Turn the mode switch.
+    Mode {
+        /// To this.
+        mode: FlightMode,
+    },
+    /// Pull the throttle stick to its lowest, and catch the vehicle.
+    Chop {
+        /// For how long it is there, s.
+        seconds: f32,
+    },
+    /// Change a parameter of the vehicle.
+    Set {
+        /// Its place in the table.
+        index: usize,
+        /// Its new value.
+        value: f32,
+    },
     /// Land and disarm.
     Land,
 }
@@ -103,8 +130,19 @@ pub const REFERENCE: &str = include_str!("../../missions/square.mission");
 /// Take-off, a minute of hovering, landing.
 pub const HOVER: &str = include_str!("../../missions/hover.mission");
 
-/// The shortest flight that has every moment at which a fault can begin: for campaigns.
+/// The shortest flight that has every usual moment at which a fault can begin: for campaigns.
 pub const SHORT: &str = "arm; takeoff 0.5; hover 2; goto 1 0 0.7; land";
+
+/// Missions for campaigns, each for a moment that does not come in others. A flip needs height and room above it, a chop some
+/// height to be caught in. The switch goes from a mode that holds height to a manual one, or the other way. The gain is one that
+/// changes in flight, a tenth more of it.
+pub const OCCASIONS: &[&str] = &[
+    "arm; takeoff 1.5; hover 2; flip left; hover 2; land",
+    "arm; takeoff 1; hover 2; mode poshold; hover 3; land",
+    "arm; takeoff 1; hover 2; mode stabilize; hover 3; land",
+    "arm; takeoff 1.5; hover 2; chop 0.3; hover 3; land",
+    "arm; takeoff 0.5; hover 2; set rate.roll.kp 0.00044; hover 2; land",
+];
 
 /// Random number stream of random missions; the vehicle's own are below a thousand.
 const STREAM: u64 = 1_000;
@@ -165,6 +203,43 @@ impl Mission {
     }
 }
 
+impl Mission {
+    /// The moments that come in a flight of this mission, by a program or by a pilot in a mode, when nothing goes wrong; in
+    /// their order.
+    ///
+    /// ```
+    /// use stampfly_board::simulation::mission::Mission;
+    /// use stampfly_sim::fault::Moment;
+    /// let mission = Mission::parse("arm; takeoff 1; hover 2; chop 0.3; land")?;
+    /// assert!(!mission.moments(None).contains(&Moment::Chop), "a program has no stick");
+    /// # Ok::<(), stampfly_board::simulation::mission::MissionError>(())
+    /// ```
+    #[must_use]
+    pub fn moments(&self, pilot: Option<FlightMode>) -> Vec<Moment> {
+        let mut comes = vec![Some(Moment::Calibration)];
+        let mut mode = pilot;
+        for step in &self.steps {
+            comes.extend(match *step {
+                Step::Arm => [Some(Moment::Ground), Some(Moment::Spool)],
+                Step::TakeOff { .. } => [Some(Moment::TakeOff), None],
+                Step::Hover { seconds } => [(seconds > 1.5).then_some(Moment::Hover), None],
+                Step::GoTo { .. } => [Some(Moment::Hover), Some(Moment::Move)],
+                Step::Flip { .. } => [mode.is_none_or(|mode| !mode.is_manual()).then_some(Moment::Flip), None],
+                Step::Mode { mode: to } => {
+                    let turns = mode.is_some_and(|mode| mode != to);
+                    mode = mode.map(|_| to);
+                    [turns.then_some(Moment::Mode), None]
+                }
+                Step::Chop { .. } => [mode.map(|_| Moment::Chop), None],
+                Step::Set { .. } => [Some(Moment::Parameter), None],
+                Step::Land => [Some(Moment::Landing), Some(Moment::Touch)],
+                Step::Autotune { .. } => [None, None],
+            });
+        }
+        Moment::ALL.into_iter().filter(|moment| comes.contains(&Some(*moment))).collect()
+    }
+}
+
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -188,6 +263,15 @@ impl fmt::Display for Step {
                 let (name, _) = AXES.iter().find(|(_, known)| *known == axis).unwrap_or(&AXES[0]);
                 write!(f, "autotune {name}")
             }
+            Self::Mode { mode } => {
+                let known = |name: &&&str| pilot::mode_named(name) == Some(mode);
+                write!(f, "mode {}", pilot::MODES.iter().find(known).unwrap_or(&"poshold"))
+            }
+            Self::Chop { seconds } => write!(f, "chop {seconds}"),
+            Self::Set { index, value } => {
+                let name = parameters::all().nth(index).map_or("", |info| info.name);
+                write!(f, "set {name} {value}")
+            }
             Self::Land => f.write_str("land"),
         }
     }
@@ -202,6 +286,9 @@ impl fmt::Display for Mission {
         Ok(())
     }
 }
+
+/// Words for the steps.
+const STEPS: [&str; 10] = ["arm", "takeoff", "goto", "hover", "flip", "autotune", "mode", "chop", "set", "land"];
 
 /// Words for the ways to turn over.
 const DIRECTIONS: [(&str, FlipDirection); 4] = [
@@ -227,6 +314,21 @@ fn direction(word: Option<&&str>) -> Result<FlipDirection, String> {
     known.map(|(_, direction)| *direction).ok_or_else(|| format!("'{word}' is none of left, right, forward, back"))
 }
 
+fn mode(word: Option<&&str>) -> Result<FlightMode, String> {
+    let word = word.ok_or("mode is missing")?;
+    let known = pilot::MODES.contains(word).then(|| pilot::mode_named(word)).flatten();
+    known.ok_or_else(|| format!("'{word}' is none of {}", pilot::MODES.join(", ")))
+}
+
+/// A parameter's place in the table, and a value in its range.
+fn parameter(word: Option<&&str>, value: Option<&&str>) -> Result<(usize, f32), String> {
+    let word = word.ok_or("parameter is missing")?;
+    let mut table = parameters::all().enumerate();
+    let (index, info) =
+        table.find(|(_, info)| info.name == *word).ok_or_else(|| format!("there is no parameter '{word}'"))?;
+    Ok((index, number(value, word, info.min..=info.max)?))
+}
+
 fn number(word: Option<&&str>, what: &str, range: std::ops::RangeInclusive<f32>) -> Result<f32, String> {
     let word = word.ok_or_else(|| format!("{what} is missing"))?;
     let value: f32 = word.parse().map_err(|_| format!("{what}: '{word}' is no number"))?;
@@ -242,9 +344,15 @@ fn parse_step(verb: &str, arguments: &[&str]) -> Result<Step, String> {
         "hover" => (Step::Hover { seconds: number(arguments.first(), "seconds", 0.0..=3600.0)? }, 1),
         "flip" => (Step::Flip { direction: direction(arguments.first())? }, 1),
         "autotune" => (Step::Autotune { axis: axis(arguments.first())? }, 1),
+        "mode" => (Step::Mode { mode: mode(arguments.first())? }, 1),
+        "chop" => (Step::Chop { seconds: number(arguments.first(), "seconds", 0.02..=10.0)? }, 1),
+        "set" => {
+            let (index, value) = parameter(arguments.first(), arguments.get(1))?;
+            (Step::Set { index, value }, 2)
+        }
         "goto" => return parse_goto(arguments),
         other => {
-            return Err(format!("'{other}' is no step; steps are arm, takeoff, goto, hover, flip, autotune, land"));
+            return Err(format!("'{other}' is no step; steps are {}", STEPS.join(", ")));
         }
     };
     match arguments.get(used) {
@@ -280,7 +388,7 @@ mod tests {
 
     #[test]
     fn the_built_in_missions_are_missions() {
-        for text in [REFERENCE, HOVER, SHORT] {
+        for text in [REFERENCE, HOVER, SHORT].iter().chain(OCCASIONS) {
             let mission = Mission::parse(text).expect("a mission");
             assert_eq!((mission.steps[0], mission.steps.last()), (Step::Arm, Some(&Step::Land)));
         }
@@ -292,7 +400,8 @@ mod tests {
             let mission = Mission::random(seed);
             assert_eq!(Mission::parse(&mission.to_string()), Ok(mission));
         }
-        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; flip back; autotune yaw; land";
+        let text = "arm; takeoff 0.5; goto 1 0 0.5 yaw 90 speed 0.5 dwell 1; hover 2; flip back; autotune yaw; \
+                    mode acro; chop 0.25; set rate.roll.kp 0.00045; land";
         assert_eq!(Mission::parse(text).expect("a mission").to_string(), text);
     }
 
@@ -301,14 +410,34 @@ mod tests {
         let message = |text: &str| Mission::parse(text).expect_err("a mistake").to_string();
         assert_eq!(
             message("arm\n\nfly 3"),
-            "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, flip, autotune, land"
+            "line 3: 'fly' is no step; steps are arm, takeoff, goto, hover, flip, autotune, mode, chop, set, land"
         );
         assert_eq!(message("takeoff"), "line 1: height is missing");
         assert_eq!(message("takeoff NaN"), "line 1: height: NaN is not from 0.1 to 10");
         assert_eq!(message("goto 1 2 0.5 yaw"), "line 1: yaw is missing");
         assert_eq!(message("flip over"), "line 1: 'over' is none of left, right, forward, back");
         assert_eq!(message("land now"), "line 1: 'now' is too much");
+        assert_eq!(message("mode loiter"), "line 1: 'loiter' is none of stabilize, acro, althold, poshold");
+        assert_eq!(message("chop"), "line 1: seconds is missing");
+        assert_eq!(message("set rate.roll 1"), "line 1: there is no parameter 'rate.roll'");
+        assert!(message("set rate.roll.kp 9").starts_with("line 1: rate.roll.kp: 9 is not from "));
+        assert_eq!(message("set rate.roll.kp"), "line 1: rate.roll.kp is missing");
         assert_eq!(message("# nothing"), "the mission has no steps");
+    }
+
+    /// Every moment comes by a program or in some mode of a pilot, in a mission that campaigns fly.
+    #[test]
+    fn there_is_a_mission_for_every_moment() {
+        let missions: Vec<_> = [SHORT].iter().chain(OCCASIONS).filter_map(|text| Mission::parse(text).ok()).collect();
+        let modes = pilot::MODES.iter().filter_map(|name| pilot::mode_named(name));
+        let comes = |pilot: Option<FlightMode>| missions.iter().flat_map(move |mission| mission.moments(pilot));
+        let mut left = Moment::ALL.to_vec();
+        for pilot in [None].into_iter().chain(modes.map(Some)) {
+            let here: Vec<_> = comes(pilot).collect();
+            assert!(Moment::USUAL.iter().all(|moment| here.contains(moment)), "{pilot:?}");
+            left.retain(|moment| !here.contains(moment));
+        }
+        assert_eq!(left, []);
     }
 
     proptest! {

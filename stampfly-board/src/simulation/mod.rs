@@ -6,6 +6,7 @@
 //! | [`sensing`] | what feeds the bus: models of the sensors, or the drivers over emulated chips |
 //! | [`mission`], [`ground_station`] | what to fly, and the program that asks the vehicle for it |
 //! | [`pilot`], [`radio`] | a person with a transmitter instead; what carries commands and telemetry |
+//! | [`Settings`] | the vehicle's parameters while it is on |
 //! | [`Air`] | the secure session as real bytes on that radio, and a flood of a stranger's |
 //! | [`faults`], [`judge`] | what can go wrong, and what came of it |
 //! | [`bench`](mod@bench) | a vehicle on a bench, with somebody who holds it, looks, listens and presses its button |
@@ -32,6 +33,7 @@ pub mod pilot;
 pub mod plant;
 pub mod radio;
 pub mod sensing;
+mod settings;
 mod setup;
 mod terminal;
 mod watch;
@@ -40,6 +42,7 @@ pub use air::{Air, AirReport};
 pub use outcome::{Outcome, PhaseChange};
 pub use page::PAGE;
 pub use plant::PLANT;
+pub use settings::Settings;
 pub use setup::Setup;
 
 use crate::config::VehicleConfig;
@@ -51,7 +54,7 @@ use sensing::Sensing;
 use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
-use stampfly_sim::fault::FaultKind;
+use stampfly_sim::fault::{FaultKind, Moment};
 use stampfly_sim::sticks::{StickOptions, Sticks, Throttle, mode_named};
 use stampfly_sim::vehicle::{
     self, Ended, FlightOptions, Golden, Options, Page, PortSpec, Remote, RemoteError, Setting, SetupError, Variety,
@@ -70,8 +73,13 @@ impl Vehicle for StampFly {
     const NAME: &'static str = "stampfly";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety =
-        Variety { modes: pilot::MODES, missions: &[mission::SHORT, "square", "random"], times: [3, 12], chips: true };
+    const VARIETY: Variety = Variety {
+        modes: pilot::MODES,
+        missions: &[mission::SHORT, "square", "random"],
+        occasions: mission::OCCASIONS,
+        times: [3, 12],
+        chips: true,
+    };
     const PORTS: &'static [PortSpec] = live::PORTS;
     const PAGE: Page = PAGE;
     type Runnables = Runnables;
@@ -103,6 +111,7 @@ impl Vehicle for StampFly {
             let unknown = || format!("--mode '{name}' is none of {}", pilot::MODES.join(", "));
             setup.pilot = Some(mode.ok_or_else(unknown)?);
         }
+        setup.vehicle.flies_on = options.flies_on;
         setup.sensing = if options.chips { Sensing::Chips } else { Sensing::Models };
         setup.cameras = options.cameras;
         setup.jitter = options.jitter;
@@ -159,11 +168,18 @@ impl Vehicle for StampFly {
             let value = f64::from(config.get(index)?);
             Some(Setting { name: info.name, value, unit: info.unit, meaning: info.meaning })
         });
-        settings.collect()
+        // No parameter, but what a log needs to be replayed.
+        let meaning = "1: flies on where a protection stops the motors in the air";
+        let flies_on = Setting { name: FLIES_ON, value: 1.0, unit: "1", meaning };
+        settings.chain(config.flies_on.then_some(flies_on)).collect()
     }
 
     fn set_parameter(config: &mut VehicleConfig, name: &str, value: ParameterValue) -> Result<(), SetupError> {
         let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
+        if name == FLIES_ON {
+            config.flies_on = value != 0.0;
+            return Ok(());
+        }
         // A log has what was flown, whatever may fly today.
         set_alone(config, name, value).map_err(|error| format!("{name}: {error}"))
     }
@@ -186,6 +202,13 @@ impl Vehicle for StampFly {
             leading: Id::sensor_imu as usize,
             settled: |outcome| outcome.phases.last().map(|phase| phase.since),
         })
+    }
+
+    fn moments(options: &Options, seed: u64) -> Vec<Moment> {
+        let Some(mission) = mission_of(options, seed).ok().filter(|_| options.sticks.is_none()) else {
+            return Moment::USUAL.to_vec();
+        };
+        mission.moments(options.pilot.as_deref().and_then(pilot::mode_named))
     }
 
     fn shorter_missions(options: &Options, seed: u64) -> Vec<String> {
@@ -244,6 +267,9 @@ fn mission_of(options: &Options, seed: u64) -> Result<Mission, SetupError> {
     }
     .map_err(|error| format!("mission {name}: {error}"))
 }
+
+/// Under this name a log has that protections did not stop the motors in the air.
+const FLIES_ON: &str = "simulation.flies_on";
 
 /// The mission of the golden flight.
 const GOLDEN: &str = "arm\ntakeoff 0.2\nhover 0.3\nland\n";

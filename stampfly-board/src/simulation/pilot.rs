@@ -14,9 +14,10 @@
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
 //!
-//! `sticks` is the pilot who plays a stick file, however that ends.
+//! `tricks` is what a mission asks of a pilot beside places; `sticks` the pilot who plays a stick file, however that ends.
 
 mod sticks;
+mod tricks;
 
 pub(super) use sticks::{approach, mission_around};
 
@@ -24,15 +25,18 @@ use super::ground_station::Progress;
 use super::home::Home;
 use super::mission::{LONGEST_LEG, Mission, Step};
 use super::radio::Radio;
+use super::settings::Settings;
 use stampfly_control::CascadeConfig;
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_sim::World;
-use stampfly_types::messages::{FlightMode, FlightPhase, PilotInput};
+use stampfly_types::messages::{FlightMode, FlightPhase, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 use std::collections::VecDeque;
 
 /// Of the transmitter's frames.
 const PERIOD: Duration = Duration::from_millis(20);
+/// A program that has asked for something says as often as this that it is still there, frames.
+const ALIVE: u32 = 5;
 /// Frames until a pilot reacts: 0.2 s, a trained person's reaction to what is seen.
 const REACTION: usize = 10;
 /// Sticks closer to their centre than this do nothing, as the vehicle's arbitration has it.
@@ -121,6 +125,10 @@ pub(super) struct Pilot<'b> {
     lean_trim: [f32; 2],
     /// Since when it has been far from its place.
     lost: Option<Instant>,
+    settings: Option<Settings<'b>>,
+    /// The program beside the pilot has asked for something.
+    asked: bool,
+    frames: u32,
 }
 
 impl<'b> Pilot<'b> {
@@ -136,7 +144,15 @@ impl<'b> Pilot<'b> {
             trim: 0.0,
             lean_trim: [0.0; 2],
             lost: None,
+            settings: None,
+            asked: false,
+            frames: 0,
         }
+    }
+
+    /// One who can change parameters.
+    pub fn with_settings(self, settings: Settings<'b>) -> Self {
+        Self { settings: Some(settings), ..self }
     }
 
     /// Flies the mission. A place that cannot be reached is given up. With `waits`, two seconds pass between the
@@ -182,8 +198,16 @@ impl<'b> Pilot<'b> {
                     self.keep(Aim::Be(place), Duration::from_seconds(dwell)).await;
                 }
                 Step::Hover { seconds } => self.keep(Aim::Be(place), Duration::from_seconds(seconds)).await,
+                Step::Flip { direction } => self.turn_over(direction).await,
+                Step::Mode { mode } => self.turn_to(mode, place).await,
+                Step::Chop { seconds } => self.chop(seconds).await,
+                Step::Set { index, value } => {
+                    let now = self.radio.clock().now();
+                    // A refusal is seen: the parameter's moment never comes.
+                    let _ = self.settings.as_mut().map(|settings| settings.set(now, index, value));
+                }
                 // No switch of a transmitter asks for it.
-                Step::Flip { .. } | Step::Autotune { .. } => {}
+                Step::Autotune { .. } => {}
                 Step::Land => self.land(place).await,
             }
             progress.done.set(progress.done.get() + 1);
@@ -259,10 +283,20 @@ impl<'b> Pilot<'b> {
 
     /// Looks, sends a frame, and waits for the next.
     async fn frame(&mut self, aim: Aim) -> Seen {
+        self.frame_with(aim, None).await
+    }
+
+    /// The same, with the throttle stick at this place.
+    async fn frame_with(&mut self, aim: Aim, throttle: Option<f32>) -> Seen {
         let now = self.radio.clock().now();
         let seen = self.look(now);
         self.steer(aim, &seen);
+        self.input.throttle = throttle.unwrap_or(self.input.throttle);
         self.radio.sticks(&self.input);
+        self.frames += 1;
+        if self.asked && self.frames.is_multiple_of(ALIVE) {
+            self.radio.command(GuidedCommand::default());
+        }
         if let Aim::Be(place) | Aim::Sink(place) = aim {
             self.mistrust(place, &seen, now);
         }
@@ -342,14 +376,16 @@ impl<'b> Pilot<'b> {
         } else {
             climb / self.meaning.navigator.sink_rate
         };
-        let stick = |share: f32| {
-            let beyond = share.signum() * (DEAD_BAND + (1.0 - DEAD_BAND) * share.abs());
-            if share.abs() < 0.001 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
-        };
         let yaw = stick(limit(-seen.yaw, 0.8) / turn);
         self.input =
             PilotInput { roll: stick(roll), pitch: stick(pitch), yaw, throttle: stick(throttle), ..self.input };
     }
+}
+
+/// Where a stick is that means this share, beyond the dead band.
+fn stick(share: f32) -> f32 {
+    let beyond = share.signum() * (DEAD_BAND + (1.0 - DEAD_BAND) * share.abs());
+    if share.abs() < 0.001 { 0.0 } else { beyond.clamp(-1.0, 1.0) }
 }
 
 /// Names of the flight modes, as options give them.

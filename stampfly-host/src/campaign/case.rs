@@ -2,9 +2,11 @@
 //!
 //! So a campaign is flown in parts, on any machines and in any order, without anybody who hands out work.
 //!
-//! The first flights walk through every *cell*: every fault of the vehicle's table, with its usual value, at every moment
-//! of a short flight, under a program's commands and then in every mode of a pilot. The others draw fault, value, moment,
-//! duration, mode, mission and surroundings from the flight's seed; with [`Plan::pairs`], half of them have two faults.
+//! The first flights walk through every *cell*: first without a fault, then every fault of the vehicle's table, with its usual
+//! value, at every moment, under a program's commands and then in every mode of a pilot. A moment that does not come in the
+//! shortest mission has a mission of its own. The others draw fault, size, moment, duration, mode, mission and surroundings from
+//! the flight's seed, and one in ten of them has no fault; with [`Plan::pairs`], half of those with a fault have two.
+//! With [`Plan::drawn`], all flights are of this kind.
 //! With [`Plan::only`], the cells are of these faults alone, and all flights walk through them, again and again with other seeds.
 
 use crate::vehicles::DEFAULT;
@@ -12,19 +14,18 @@ use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::fault::{Fault, FaultKind, FaultValue, Moment, When};
 use stampfly_sim::sticks::StickOptions;
-use stampfly_sim::vehicle::{Options, Variety, Vehicle, WorldKind};
+use stampfly_sim::vehicle::{Options, SetupError, Vehicle, WorldKind};
 use stampfly_types::Duration;
 
 /// Random number stream of campaigns; those of vehicles, missions and faults are others.
 const STREAM: u64 = 1_100;
 
-/// Values are drawn from this part of the table's usual value to that: the table says how a flight may end with the usual
-/// one, and milder ones may not end worse.
-const VALUES: [f64; 2] = [0.25, 1.0];
 /// Shortest and longest duration, s.
 const LASTS: [f64; 2] = [0.05, 10.0];
 /// Strongest gusts, m/s: half more than in the reference mission.
 const GUST: f64 = 0.8;
+/// Share of drawn flights without a fault.
+const NOMINAL: f64 = 0.1;
 
 /// A campaign: everything that decides which flights it has.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -35,6 +36,9 @@ pub struct Plan {
     pub flights: u64,
     /// Are there flights with two faults?
     pub pairs: bool,
+    /// Are all flights drawn, and none of a cell?
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub drawn: bool,
     /// Faults as `NAME[=VALUE]` to which all flights are confined; empty for a campaign of all faults.
     pub only: Vec<String>,
     /// What all flights have in common. Each has its own fault and pilot, so these two are empty.
@@ -54,8 +58,19 @@ pub struct Case {
     pub options: Options,
 }
 
-/// A cell of a campaign's first flights: fault as `NAME[=VALUE]`, moment, mode of a pilot.
-type Cell = (String, Moment, Option<&'static str>);
+/// A cell of a campaign's first flights.
+#[derive(Clone, Debug, PartialEq)]
+struct Cell {
+    /// `NAME[=VALUE]@WHEN`; nothing for a flight without a fault.
+    fault: Option<String>,
+    /// Of a pilot.
+    mode: Option<&'static str>,
+    /// Nothing is the one of the campaign's options.
+    mission: Option<&'static str>,
+}
+
+/// Which moments come in flights of this mission and mode.
+type Moments = fn(&Options, u64) -> Vec<Moment>;
 
 /// The flights of a campaign.
 #[derive(Clone, Debug)]
@@ -64,7 +79,9 @@ pub struct Cases {
     plan: Plan,
     faults: &'static [FaultKind],
     modes: &'static [&'static str],
-    missions: &'static [&'static str],
+    /// Nothing is the one of the campaign's options.
+    missions: Vec<Option<&'static str>>,
+    moments: Moments,
     times: [u16; 2],
     chips: bool,
     cells: Vec<Cell>,
@@ -72,26 +89,84 @@ pub struct Cases {
 
 impl Cases {
     /// The flights of this campaign of this vehicle.
-    #[must_use]
-    pub fn new<V: Vehicle>(plan: &Plan) -> Self {
-        let (faults, modes) = (V::FAULTS, V::VARIETY.modes);
-        let rounds = Moment::ALL.len();
-        let modes_and_none = std::iter::once(None).chain(modes.iter().copied().map(Some));
-        let walked = if plan.only.is_empty() {
-            faults.iter().map(|kind| kind.name.to_owned()).collect()
-        } else {
-            plan.only.clone()
+    ///
+    /// # Errors
+    /// When one of [`Plan::only`] is no fault of the vehicle.
+    pub fn new<V: Vehicle>(plan: &Plan) -> Result<Self, SetupError> {
+        let variety = V::VARIETY;
+        // Every one of the vehicle's, or the one that all flights have.
+        let missions = match plan.options.mission {
+            Some(_) => vec![None],
+            None => variety.missions.iter().chain(variety.occasions).copied().map(Some).collect(),
         };
-        // Each round has every fault once, and the moments in turn: a campaign that is cut short has seen some of all.
-        let mut cells: Vec<Cell> = Vec::new();
-        for mode in modes_and_none {
-            for round in 0..rounds {
-                let moment = |place: usize| Moment::ALL[(round + place) % rounds];
-                cells.extend(walked.iter().enumerate().map(|(place, fault)| (fault.clone(), moment(place), mode)));
+        let mut cases = Self {
+            vehicle: V::NAME,
+            plan: plan.clone(),
+            faults: V::FAULTS,
+            modes: variety.modes,
+            missions: if missions.is_empty() { vec![None] } else { missions },
+            moments: V::moments,
+            times: variety.times,
+            chips: variety.chips,
+            cells: Vec::new(),
+        };
+        for text in &plan.only {
+            Fault::parse(&format!("{text}@0"), V::FAULTS).map_err(|error| format!("--only {error}"))?;
+        }
+        if !plan.drawn {
+            cases.walk();
+        }
+        Ok(cases)
+    }
+
+    /// Lists the cells. Each round has every fault once, and the moments in turn: a campaign that is cut short has seen some of
+    /// all.
+    fn walk(&mut self) {
+        let modes = std::iter::once(None).chain(self.modes.iter().copied().map(Some));
+        let of_modes: Vec<_> = modes.map(|mode| (mode, self.occasions(mode))).collect();
+        let mut cells = Vec::new();
+        if self.plan.only.is_empty() {
+            for (mode, occasions) in &of_modes {
+                let mut flown = Vec::new();
+                for (_, mission) in occasions.iter().filter(|(_, mission)| {
+                    let is_new = !flown.contains(mission);
+                    flown.push(*mission);
+                    is_new
+                }) {
+                    cells.push(Cell { fault: None, mode: *mode, mission: *mission });
+                }
             }
         }
-        let Variety { missions, times, chips, .. } = V::VARIETY;
-        Self { vehicle: V::NAME, cells, plan: plan.clone(), faults, modes, missions, times, chips }
+        let all = || self.faults.iter().map(|kind| kind.name.to_owned()).collect();
+        let walked: Vec<String> = if self.plan.only.is_empty() { all() } else { self.plan.only.clone() };
+        for (mode, occasions) in &of_modes {
+            for round in 0..occasions.len() {
+                cells.extend(walked.iter().enumerate().filter_map(|(place, fault)| {
+                    let (moment, mission) = *occasions.get((round + place) % occasions.len())?;
+                    Some(Cell { fault: Some(format!("{fault}@{}", moment.name())), mode: *mode, mission })
+                }));
+            }
+        }
+        self.cells = cells;
+    }
+
+    /// Every moment that comes in some mission in this mode, with the first mission in which it does.
+    fn occasions(&self, mode: Option<&'static str>) -> Vec<(Moment, Option<&'static str>)> {
+        let of_missions: Vec<_> =
+            self.missions.iter().map(|mission| (*mission, self.comes(mode, *mission, 1))).collect();
+        let first = |moment: Moment| {
+            let found = of_missions.iter().find(|(_, comes)| comes.contains(&moment));
+            found.map(|(mission, _)| (moment, *mission))
+        };
+        Moment::ALL.into_iter().filter_map(first).collect()
+    }
+
+    /// The moments of this mission in this mode.
+    fn comes(&self, mode: Option<&'static str>, mission: Option<&'static str>, seed: u64) -> Vec<Moment> {
+        let mut options = self.plan.options.clone();
+        options.pilot = mode.map(Into::into);
+        options.mission = mission.map(Into::into).or(options.mission);
+        (self.moments)(&options, seed)
     }
 
     /// How many flights walk through the cells: every cell is flown in a campaign that has as many.
@@ -109,10 +184,10 @@ impl Cases {
         options.jitter = options.jitter.map(|seed| seed.wrapping_add(index));
         let round = if self.plan.only.is_empty() { index } else { index % (self.cells.len() as u64).max(1) };
         match usize::try_from(round).ok().and_then(|place| self.cells.get(place)) {
-            Some((fault, moment, mode)) => {
-                options.fault = vec![format!("{fault}@{}", moment.name())];
+            Some(Cell { fault, mode, mission }) => {
+                options.fault = fault.iter().cloned().collect();
                 options.pilot = mode.map(Into::into);
-                options.mission = options.mission.or_else(|| self.missions.first().map(|mission| (*mission).into()));
+                options.mission = mission.map(Into::into).or(options.mission);
             }
             None => self.draw(&mut options, seed),
         }
@@ -122,18 +197,23 @@ impl Cases {
     /// Anything at all.
     fn draw(&self, options: &mut Options, seed: u64) {
         let mut dice = Dice(Noise::new(seed, STREAM));
-        let Some(first) = dice.one(self.faults) else { return };
-        options.fault = vec![dice.fault(first, self.times).to_string()];
-        if self.plan.pairs && dice.0.chance(0.5) {
-            // Two of a kind would be one.
-            let others: Vec<_> = self.faults.iter().filter(|kind| kind.name != first.name).collect();
-            options.fault.extend(dice.one(&others).map(|kind| dice.fault(kind, self.times).to_string()));
-        }
         // As often under a program's commands as in any one mode.
         let mode = dice.below(self.modes.len() + 1);
-        options.pilot = self.modes.get(mode).map(|mode| (*mode).into());
-        if options.mission.is_none() {
-            options.mission = dice.one(self.missions).map(|mission| (*mission).into());
+        let mode = self.modes.get(mode).copied();
+        let mission = dice.one(&self.missions).copied().flatten();
+        let moments = self.comes(mode, mission, seed);
+        options.pilot = mode.map(Into::into);
+        options.mission = mission.map(Into::into).or_else(|| options.mission.take());
+        if !dice.0.chance(NOMINAL)
+            && let Some(first) = dice.one(self.faults)
+        {
+            options.fault = vec![dice.fault(first, &moments, self.times).to_string()];
+            if self.plan.pairs && dice.0.chance(0.5) {
+                // Two of a kind would be one.
+                let others: Vec<_> = self.faults.iter().filter(|kind| kind.name != first.name).collect();
+                let second = dice.one(&others).map(|kind| dice.fault(kind, &moments, self.times).to_string());
+                options.fault.extend(second);
+            }
         }
         options.gust = options.gust.or(Some(dice.round(0.0, GUST) as f32));
         options.chips |= dice.0.chance(0.1) && self.chips;
@@ -161,23 +241,21 @@ impl Dice {
         format!("{value:.2e}").parse().unwrap_or(value)
     }
 
-    /// This fault, some time.
-    fn fault(&mut self, kind: &'static FaultKind, times: [u16; 2]) -> Fault {
-        let value = match kind.value {
-            FaultValue::None => None,
-            FaultValue::Number { default, range: [low, high], .. } => {
-                Some(self.round(VALUES[0] * default, VALUES[1] * default).clamp(low, high))
-            }
-            FaultValue::OrLast { range: [low, high], .. } => {
-                self.0.chance(0.5).then(|| self.round(low, high).clamp(low, high))
-            }
+    /// This fault, at one of these moments or at some time.
+    fn fault(&mut self, kind: &'static FaultKind, moments: &[Moment], times: [u16; 2]) -> Fault {
+        let last = matches!(kind.value, FaultValue::OrLast { .. }) && self.0.chance(0.5);
+        let value = match kind.sizes.filter(|_| !last) {
+            Some(sizes) => Some(sizes.draw(&mut self.0)),
+            None => kind.value.default(),
         };
-        let when = if self.0.chance(0.8) {
-            When::Moment(Moment::ALL[self.below(Moment::ALL.len())])
-        } else {
-            let [first, last] = times.map(f64::from);
-            When::After(seconds(self.round(first, last)))
-        };
+        let moment = self.one(moments).copied().filter(|_| self.0.chance(0.8));
+        let when = moment.map_or_else(
+            || {
+                let [first, last] = times.map(f64::from);
+                When::After(seconds(self.round(first, last)))
+            },
+            When::Moment,
+        );
         // Evenly over orders of magnitude.
         let lasts = self.0.chance(0.5).then(|| seconds(LASTS[0] * (LASTS[1] / LASTS[0]).powf(self.0.unit())));
         Fault { kind, value, when, lasts }
@@ -194,7 +272,7 @@ impl Case {
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
         let Self { vehicle, seed, options, .. } = self;
-        let Options { mission, pilot, sticks, fault, gust, chips, jitter, vibration, .. } = options;
+        let Options { mission, pilot, sticks, fault, gust, chips, jitter, vibration, flies_on, .. } = options;
         let mut arguments: Vec<String> = vec!["fly".into(), "--seed".into(), seed.to_string()];
         let mut add = |name: &str, value: Option<String>| {
             if let Some(value) = value {
@@ -211,6 +289,7 @@ impl Case {
         arguments.extend(pilot.as_ref().map(|_| "--pilot".into()));
         arguments.extend(sticks.iter().flat_map(of_sticks));
         arguments.extend(chips.then(|| "--chips".into()));
+        arguments.extend(flies_on.then(|| "--fly-on".into()));
         arguments.extend(rest(options));
         arguments
     }

@@ -1,13 +1,14 @@
 //! Flies one flight of a campaign and makes its row.
 
 use super::case::Case;
-use super::row::{IDLE, PANICKED, PASSED, Row, UNJUDGED};
+use super::row::{IDLE, NEEDLESS_CUT, PANICKED, PASSED, Row, UNJUDGED, moment_of};
 use crate::flown::{Flown, fly};
 use crate::recorder::Recorder;
 use serde::Deserialize;
+use serde_json::Value;
 use stampfly_log::FlightHash;
-use stampfly_sim::fault::FAULT_ACTED;
-use stampfly_sim::vehicle::{SetupError, Vehicle, Verdict};
+use stampfly_sim::fault::{Class, FAULT_ACTED};
+use stampfly_sim::vehicle::{Options, SetupError, Vehicle, Verdict};
 use stampfly_types::Instant;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -26,6 +27,12 @@ struct Findings {
     cut_height_m: Option<f64>,
     #[serde(default)]
     alerts: Vec<Named>,
+    #[serde(default)]
+    reason: String,
+    cut_in_air: Option<String>,
+    /// Objects with the fault's text and when it began, or texts where that is not told.
+    #[serde(default)]
+    faults: Vec<Value>,
 }
 
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -33,7 +40,7 @@ struct Named {
     name: String,
 }
 
-/// Flies it. A flight that panics is one that failed.
+/// Flies it. A flight that panics is one that failed. The motors' cut in the air, if there is one, [is judged](with_cut_judged).
 ///
 /// # Errors
 /// When the vehicle has no such flight.
@@ -47,24 +54,65 @@ pub fn fly_case<V: Vehicle>(case: &Case) -> Result<Row, SetupError> {
         (flown, recorder.hash())
     }));
     Ok(match flown {
-        Ok((flown, hash)) => finished(row, &flown, hash),
+        Ok((flown, hash)) => with_cut_judged::<V>(finished(row, &flown, hash), case),
         Err(_) => Row { verdict: PANICKED.into(), outcome: PANICKED.into(), ..row },
     })
+}
+
+/// The row, with its cut judged: a flight whose motors a protection stopped in the air is flown on from there, and the end of
+/// that says whether the protection was right.
+#[must_use]
+pub fn with_cut_judged<V: Vehicle>(row: Row, case: &Case) -> Row {
+    let flown_on = row.cut_by.as_ref().and_then(|_| fly_on::<V>(case));
+    judged(row, flown_on)
+}
+
+/// How the flight ends that flies on where a protection stops the motors in the air. `None` when the vehicle does not offer it,
+/// or flies so already.
+fn fly_on<V: Vehicle>(case: &Case) -> Option<String> {
+    let options = Options { flies_on: true, ..case.options.clone() };
+    let setup = V::setup(&options, case.seed).ok().filter(|_| !case.options.flies_on)?;
+    let flown = catch_unwind(AssertUnwindSafe(|| fly::<V>(&setup, &mut (), &mut |_, _| {})));
+    Some(match flown {
+        Ok(flown) => told(&flown.outcome)?.outcome,
+        Err(_) => PANICKED.into(),
+    })
+}
+
+/// The row with the end of the flight that flew on, and what that means for the verdict.
+fn judged(row: Row, flown_on: Option<String>) -> Row {
+    let acceptable = |end: &String| Class::ALL.iter().any(|class| class.name() == *end && class.may_be_acceptable());
+    let verdict = match &flown_on {
+        Some(end) if acceptable(end) && row.failed() => format!("{} {NEEDLESS_CUT}", row.verdict),
+        Some(end) if acceptable(end) => NEEDLESS_CUT.to_owned(),
+        _ => row.verdict.clone(),
+    };
+    Row { verdict, flown_on, ..row }
+}
+
+/// What a vehicle says of a flight. `None` when it does not judge it.
+fn told<O: Verdict>(outcome: &O) -> Option<Findings> {
+    // Numbers and texts always have a JSON form.
+    let findings = serde_json::to_value(outcome.findings()).unwrap_or_default();
+    serde_json::from_value(findings).ok()
 }
 
 /// The row of a flight that has been flown, with what came of it.
 #[must_use]
 pub fn finished<O: Verdict>(row: Row, flown: &Flown<O>, hash: u64) -> Row {
-    // Numbers and texts always have a JSON form.
-    let findings = serde_json::to_value(flown.outcome.findings()).unwrap_or_default();
-    let Ok(findings) = serde_json::from_value::<Findings>(findings) else {
+    let Some(findings) = told(&flown.outcome) else {
         return Row { verdict: UNJUDGED.into(), ..row };
     };
     let names: Vec<_> = findings.alerts.iter().map(|alert| alert.name.as_str()).collect();
+    let never = findings.faults.iter().filter(|fault| fault.get("since").is_some_and(Value::is_null));
+    let never: Vec<_> = never.filter_map(|fault| fault.get("fault")?.as_str().map(moment_of)).collect();
     Row {
         verdict: verdict(&findings),
         violations: findings.violations.join(" "),
         outcome: findings.outcome,
+        reason: Some(findings.reason).filter(|reason| !reason.is_empty()),
+        never_began: (!never.is_empty()).then(|| never.join("+")),
+        cut_by: findings.cut_in_air,
         expected: findings.expected.unwrap_or_default(),
         as_expected: findings.as_expected,
         max_height_m: findings.max_height_m,

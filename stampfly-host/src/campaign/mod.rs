@@ -7,6 +7,7 @@
 //! | [`case`] | which flight is number N |
 //! | [`flight`], [`row`] | flies one; a flight as a row of a table |
 //! | [`shard`], [`mod@file`] | the part of a campaign that one task flies, and its Parquet file |
+//! | [`rate`] | how often, and how well that is known |
 //! | [`summary`], [`page`] | faults × moments, failures; as CSV and HTML |
 //! | [`shrink`] | the smallest flight in which the same goes wrong |
 //! | [`sticks`] | every stick file in every mode that makes sense |
@@ -17,6 +18,7 @@ pub mod file;
 pub mod flight;
 pub mod page;
 pub mod parallel;
+pub mod rate;
 pub mod row;
 pub mod shard;
 pub mod shrink;

@@ -12,20 +12,21 @@ use std::fmt::Write;
 #[must_use]
 pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str) -> String {
     let all = &summary.all;
-    let passed = all.flights - all.failed - all.idle;
     let judged = |name: &str, count: usize, good: bool| Metric::new(name, count, "").judged(good);
     let metrics = [
         Metric::new("flights", all.flights, ""),
-        judged("passed", passed, all.failed == 0),
+        judged("passed", all.passed(), all.failed == 0),
         judged("wrong end", all.wrong, all.wrong == 0),
         judged("invariant violated", all.violated, all.violated == 0),
+        judged("needless cut", all.needless, all.needless == 0),
         Metric::new("fault changed nothing", all.idle, ""),
     ];
     let names: Vec<&str> = faults.iter().map(|kind| kind.name).collect();
     let columns: Vec<&str> = phases().filter(|phase| *phase != "time" || has_column(&summary.cells, phase)).collect();
     let legend = "<p>The worst end of each cell, and its flights; red: how many of them failed; grey: the fault changed nothing.</p>\n";
     let cells = table(&summary.cells, &names, &columns);
-    let mut body = section("Faults by the moment at which they begin", &format!("{legend}{cells}"));
+    let mut body = section("How often, with 95 % confidence", &rates(summary));
+    body += &section("Faults by the moment at which they begin", &format!("{legend}{cells}"));
     if !summary.pairs.is_empty() {
         let others: BTreeSet<&str> = summary.pairs.keys().map(|(_, other)| other.as_str()).collect();
         let others: Vec<&str> = names.iter().copied().filter(|name| others.contains(name)).collect();
@@ -39,6 +40,35 @@ pub fn html(summary: &Summary, faults: &[FaultKind], title: &str, subtitle: &str
 
 fn has_column(table: &Table, column: &str) -> bool {
     table.keys().any(|(_, name)| name == column)
+}
+
+/// Rates of flights with and without a fault, and of cuts.
+fn rates(summary: &Summary) -> String {
+    let mut text = "<div class=\"scroll\"><table class=\"list\">\n<thead><tr><th></th><th>flights</th><th>failed</th><th>wrong end</th>\
+                    <th>invariant violated</th></tr></thead>\n<tbody>\n"
+        .to_owned();
+    for (name, cell) in [("with a fault", &summary.faulted), ("without a fault", &summary.nominal)] {
+        let _ = write!(text, "<tr><th scope=\"row\">{name}</th><td>{}</td>", cell.told());
+        text.extend(cell.rates().iter().map(|(_, rate)| format!("<td>{rate}</td>")));
+        text += "</tr>\n";
+    }
+    text += "</tbody>\n</table></div>\n";
+    if !summary.cuts.is_empty() {
+        text += "<div class=\"scroll\"><table class=\"list\">\n<thead><tr><th>motors stopped in the air by</th><th>flights</th>\
+                 <th>rightly</th><th>needlessly: flown on, the flight ends acceptably</th></tr></thead>\n<tbody>\n";
+        for (name, cell) in &summary.cuts {
+            let (right, rate) = (cell.cuts - cell.needless, cell.needless_cuts());
+            let _ = writeln!(
+                text,
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{right}</td><td>{}: {rate}</td></tr>",
+                escape(name),
+                cell.cuts,
+                cell.needless
+            );
+        }
+        text += "</tbody>\n</table></div>\n";
+    }
+    text
 }
 
 fn section(title: &str, inside: &str) -> String {
@@ -66,14 +96,17 @@ fn table(cells: &Table, rows: &[&str], columns: &[&str]) -> String {
 }
 
 fn shown(cell: &Cell) -> String {
-    let Cell { flights, idle, wrong, violated, failed, worst } = cell;
+    let Cell { flights, idle, wrong, violated, needless, failed, worst, .. } = cell;
     let class = match (failed, idle == flights) {
         (0, true) => "idle",
         (0, false) => "good",
         _ => "bad",
     };
     let count = if *failed > 0 { format!("{failed}/{flights}") } else { flights.to_string() };
-    let says = format!("{flights} flights: {wrong} wrong end, {violated} invariant violated, {idle} changed nothing");
+    let rate = cell.failing();
+    let says = format!(
+        "{flights} flights: {wrong} wrong end, {violated} invariant violated, {needless} needless cut, {idle} changed nothing; failed {rate}"
+    );
     format!("<td class=\"{class}\" title=\"{says}\"><b>{}</b> <i>{count}</i></td>", escape(worst))
 }
 

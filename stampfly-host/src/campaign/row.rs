@@ -128,6 +128,8 @@ macro_rules! row {
                         }
                     }
                 }
+                // Files of an earlier version do not have all of those that may be empty.
+                missing.retain(|name| [$((stringify!($name), <$type as Stored>::IS_OPTIONAL)),*].contains(&(*name, false)));
                 missing.first().map_or(Ok(row), |name| Err(format!("there is no column {name}")))
             }
         }
@@ -150,7 +152,7 @@ row! {
     settings: String = "Other options of the flight, as on the command line.";
     parameter_digest: String = "Hash over every parameter of the flight stack and of the simulated vehicle.";
     version: String = "Version of the program.";
-    verdict: String = "`passed`; `idle`: the fault changed nothing, so the flight says nothing; else what is wrong: an end that is not acceptable, invariants, `panicked`, `unjudged` where the vehicle does not say how its flights end.";
+    verdict: String = "`passed`; `idle`: the fault changed nothing, so the flight says nothing; else what is wrong: an end that is not acceptable, invariants, `needless-cut` where flying on would have ended acceptably, `panicked`, `unjudged` where the vehicle does not say how its flights end.";
     outcome: String = "How the flight ended.";
     expected: String = "The worst end that is acceptable.";
     as_expected: bool = "Is the end no worse than that?";
@@ -163,12 +165,18 @@ row! {
     alerts: String = "Alerts, in the order in which they began, with a space between two.";
     duration_s: f64 = "Simulated time, s.";
     log_hash: String = "Hash over everything that was published.";
+    reason: Option<String> = "Why the end is no better.";
+    never_began: Option<String> = "Moments that never came, so that their faults never began, with `+` between two; nothing when all came.";
+    cut_by: Option<String> = "Protections that stopped the motors in the air, with `+` between two; nothing when none did.";
+    flown_on: Option<String> = "How the same flight ended when it flew on where they stopped the motors; nothing where they did not.";
 }
 
 /// The verdict of a flight that did what it should.
 pub const PASSED: &str = "passed";
 /// The verdict of a flight whose fault changed nothing.
 pub const IDLE: &str = "idle";
+/// The word in the verdict of a flight whose motors were stopped in the air, and that would have ended acceptably without.
+pub const NEEDLESS_CUT: &str = "needless-cut";
 /// The verdict of a flight of a vehicle that does not say how its flights end.
 pub const UNJUDGED: &str = "unjudged";
 /// The verdict and outcome of a flight that was not flown to its end because the program had a defect.
@@ -193,18 +201,34 @@ impl Row {
         ![PASSED, IDLE].contains(&self.verdict.as_str())
     }
 
+    /// Was the flight flown without a fault?
+    #[must_use]
+    pub fn is_nominal(&self) -> bool {
+        self.faults.is_empty()
+    }
+
+    /// Were the motors stopped in the air, and would the flight have ended acceptably if they had not been? `None` where they
+    /// were not, or where the vehicle does not fly on to find out.
+    #[must_use]
+    pub fn cut_was_needless(&self) -> Option<bool> {
+        self.flown_on.as_ref()?;
+        Some(self.verdict.split_whitespace().any(|word| word == NEEDLESS_CUT))
+    }
+
     /// Invariants that the vehicle did not hold.
     pub fn broken(&self) -> impl Iterator<Item = &str> {
         self.violations.split_whitespace().filter(|name| *name != FAULT_ACTED)
     }
 
-    /// Did it fail as this one did: with the same end if that was wrong, with one of its violations if it had any?
+    /// Did it fail as this one did: with the same end if that was wrong, with one of its violations if it had any, with a needless cut
+    /// if it had one?
     #[must_use]
     pub fn failed_like(&self, other: &Self) -> bool {
         let same_end = other.as_expected || (!self.as_expected && self.outcome == other.outcome);
         let same_violation =
             other.broken().next().is_none() || other.broken().any(|name| self.broken().any(|broken| broken == name));
-        self.failed() && same_end && same_violation
+        let same_cut = other.cut_was_needless() != Some(true) || self.cut_was_needless() == Some(true);
+        self.failed() && same_end && same_violation && same_cut
     }
 
     /// The columns that say what was flown.
@@ -221,7 +245,7 @@ impl Row {
             mode: options.pilot.clone(),
             faults: options.fault.join(" "),
             fault: joined(&|text| text.split(['=', '@']).next().unwrap_or_default().into()),
-            phase: joined(&phase),
+            phase: joined(&moment_of),
             gust: options.gust.map(shown),
             vibration: options.vibration,
             chips: options.chips,
@@ -265,8 +289,8 @@ impl Row {
     }
 }
 
-/// The moment of a fault's text.
-fn phase(fault: &str) -> String {
+/// The moment of a fault's text; `time` when it begins at one.
+pub(super) fn moment_of(fault: &str) -> String {
     let when = fault.split('@').nth(1).and_then(|rest| rest.split('+').next()).unwrap_or_default();
     if when.starts_with(|letter: char| letter.is_ascii_digit()) { "time".into() } else { when.into() }
 }

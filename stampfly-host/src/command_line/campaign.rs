@@ -2,6 +2,7 @@
 //! consistency was asked for and is outside its bars.
 
 use crate::campaign::parallel::workers;
+use crate::campaign::rate::Rate;
 use crate::campaign::{self, Flight, spreads};
 use crate::command_line::arguments::CampaignOptions;
 use crate::command_line::failure::Failure;
@@ -105,6 +106,7 @@ fn print<V: Vehicle, W>(
         let mut object = Map::new();
         object.insert("flights".into(), json!(all));
         object.insert("succeeded".into(), json!(succeeded));
+        object.insert("success".into(), json!(Rate::of(succeeded, all)));
         // Such as `landed`: in how many flights it held.
         for (fact, held) in facts(flights) {
             object.insert(fact.into(), json!(held));
@@ -130,7 +132,8 @@ fn print<V: Vehicle, W>(
     }
     let cores = workers(all, None);
     let plural = if cores == 1 { "" } else { "s" };
-    outln!("\n{succeeded} of {all} flights succeeded; {factor:.0} × real time on {cores} core{plural}");
+    let rate = Rate::of(succeeded, all);
+    outln!("\n{succeeded} of {all} flights succeeded, {rate}; {factor:.0} × real time on {cores} core{plural}");
     let failures = || flights.iter().filter(|flight| !flight.succeeded());
     for flight in failures().take(MOST_TOLD) {
         outln!("  seed {:<12} {}", flight.seed, flight.flown.outcome.sentence());

@@ -5,15 +5,16 @@ use crate::campaign::flight::fly_case;
 use crate::campaign::row::Row;
 use crate::campaign::shard::Shard;
 use crate::campaign::shrink::shrink;
-use crate::campaign::summary::Summary;
+use crate::campaign::summary::{Cell, Summary};
 use crate::campaign::{file, page, parallel};
 use crate::command_line::arguments::{CampaignOptions, Engine};
 use crate::command_line::engine::{self, Job};
 use crate::command_line::failure::Failure;
 use crate::command_line::terminal;
 use indicatif::ProgressBar;
-use serde_json::json;
+use serde_json::{Value, json};
 use stampfly_sim::vehicle::Vehicle;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::hash::{DefaultHasher, Hasher as _};
 use std::path::{Path, PathBuf};
@@ -51,9 +52,9 @@ struct Campaign<'o> {
 impl<'o> Campaign<'o> {
     fn new<V: Vehicle>(options: &'o CampaignOptions) -> Result<Self, Failure> {
         let CampaignOptions { scene, flights, seed, of_faults, .. } = options;
-        let (pairs, only) = (of_faults.pairs, of_faults.only.clone());
-        let plan = Plan { seed: *seed, flights: *flights, pairs, only, options: scene.options(scene.jitter) };
-        let cases = Cases::new::<V>(&plan);
+        let (pairs, drawn, only) = (of_faults.pairs, of_faults.drawn, of_faults.only.clone());
+        let plan = Plan { seed: *seed, flights: *flights, pairs, drawn, only, options: scene.options(scene.jitter) };
+        let cases = Cases::new::<V>(&plan)?;
         // What is wrong with the options is wrong with the first flight, and each of `--only` has its turn in the first.
         for index in 0..plan.only.len().max(1) as u64 {
             let case = cases.case(index);
@@ -190,8 +191,12 @@ impl<'o> Campaign<'o> {
     /// What was flown.
     fn sentence(&self) -> String {
         let Plan { seed, flights, pairs, .. } = self.plan;
-        let (cells, pairs) = (self.cases.cells(), if pairs { ", pairs of faults among them" } else { "" });
-        format!("{flights} flights from seed {seed}, {cells} cells of fault, moment and mode{pairs}")
+        let pairs = if pairs { ", pairs of faults among them" } else { "" };
+        let which = match self.cases.cells() {
+            0 => "all drawn".to_owned(),
+            cells => format!("{cells} cells of fault, moment and mode"),
+        };
+        format!("{flights} flights from seed {seed}, {which}{pairs}")
     }
 
     /// Looks for the smallest form of the most frequent failures. Returns how many it has looked at.
@@ -220,21 +225,34 @@ impl<'o> Campaign<'o> {
     }
 
     fn print_json(&self, summary: &Summary, kept: usize, wall: f64) {
-        let Summary { all, outcomes, violations, failures, duration_s, .. } = summary;
+        let Summary { all, faulted, nominal, cuts, never_began, outcomes, violations, failures, duration_s, .. } =
+            summary;
         let failures: Vec<_> = failures
             .iter()
             .map(|failure| {
                 json!({
                     "fault": failure.fault, "phase": failure.phase, "verdict": failure.verdict,
-                    "flights": failure.flights, "line": failure.line,
+                    "flights": failure.flights, "reason": failure.reason, "line": failure.line, "flown": failure.flown,
                 })
             })
             .collect();
+        let part = |cell: &Cell| {
+            let mut part = serde_json::Map::new();
+            part.insert("flights".into(), json!(cell.flights));
+            part.insert("idle".into(), json!(cell.idle));
+            part.extend(cell.rates().map(|(name, rate)| (name.replace(' ', "_"), json!(rate))));
+            part.insert("needless_cuts".into(), json!(cell.needless_cuts()));
+            Value::Object(part)
+        };
+        let cuts: BTreeMap<_, _> = cuts.iter().map(|(name, cell)| (name, json!(cell.needless_cuts()))).collect();
         outln!(
             "{}",
             json!({
-                "flights": all.flights, "passed": all.flights - all.failed - all.idle, "idle": all.idle,
+                "flights": all.flights, "passed": all.passed(), "idle": all.idle,
                 "failed": all.failed, "wrong_class": all.wrong, "violated": all.violated, "violations": violations,
+                "right_cuts": all.cuts - all.needless, "needless_cuts": all.needless, "cuts": cuts,
+                "faulted": part(faulted), "nominal": part(nominal), "never_began": never_began,
+                "needless_by_fault": summary.needless_by_fault(),
                 "outcomes": outcomes, "cells": self.cases.cells(), "cells_flown": summary.cells.len(),
                 "kept": kept, "failures": failures, "simulated_s": duration_s, "wall_s": wall, "out": self.out,
             })
@@ -242,26 +260,14 @@ impl<'o> Campaign<'o> {
     }
 
     fn print(&self, summary: &Summary, kept: usize, shrunk: usize, wall: f64) {
-        let Summary { all, outcomes, violations, failures, duration_s, .. } = summary;
-        let counts = |counts: &std::collections::BTreeMap<String, usize>| {
-            let texts: Vec<_> = counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
-            texts.join(", ")
-        };
+        let Summary { all, failures, duration_s, .. } = summary;
         outln!("{}", self.sentence());
-        let passed = all.flights - all.failed - all.idle;
-        outln!("{passed} passed, {} failed, in {} the fault changed nothing", all.failed, all.idle);
-        outln!("ends: {}", counts(outcomes));
+        print_rates(summary);
         if all.failed > 0 {
-            let names = if violations.is_empty() { String::new() } else { format!(" ({})", counts(violations)) };
-            outln!(
-                "{} ended in a way that is not acceptable, {} violated an invariant{names}",
-                all.wrong,
-                all.violated
-            );
-            outln!("\n{:<16} {:<8} {:<22} {:>7}  repeat it", "fault", "moment", "verdict", "flights");
+            outln!("\n{:<16} {:<11} {:<22} {:>7}  repeat it", "fault", "moment", "verdict", "flights");
             for failure in failures.iter().take(MOST_PRINTED) {
                 let (fault, phase, verdict) = (&failure.fault, &failure.phase, &failure.verdict);
-                outln!("{fault:<16} {phase:<8} {verdict:<22} {:>7}  {}", failure.flights, failure.line);
+                outln!("{fault:<16} {phase:<11} {verdict:<22} {:>7}  {}", failure.flights, failure.line);
             }
             if failures.len() > MOST_PRINTED {
                 outln!("and {} more kinds of failures; the page has all of them", failures.len() - MOST_PRINTED);
@@ -281,13 +287,14 @@ impl<'o> Campaign<'o> {
 
     /// What an engine's tasks run, but for the shard.
     fn job<V: Vehicle>(&self) -> Job {
-        let Plan { seed, flights, pairs, only, options } = &self.plan;
+        let Plan { seed, flights, pairs, drawn, only, options } = &self.plan;
         let common = Case { vehicle: V::NAME.to_owned(), index: 0, seed: *seed, options: options.clone() };
         let mut arguments = vec!["campaign".to_owned(), "--faults".into()];
         // After the name of the command.
         arguments.extend(common.arguments().into_iter().skip(1));
         arguments.extend(["--flights".into(), flights.to_string()]);
         arguments.extend(pairs.then(|| "--pairs".into()));
+        arguments.extend(drawn.then(|| "--drawn".into()));
         if !only.is_empty() {
             arguments.extend(["--only".into(), only.join(",")]);
         }
@@ -323,9 +330,39 @@ impl<'o> Campaign<'o> {
     }
 }
 
+/// What came of the flights, and how often.
+fn print_rates(summary: &Summary) {
+    let Summary { all, faulted, nominal, cuts, never_began, outcomes, violations, .. } = summary;
+    let counts = |counts: &BTreeMap<String, usize>| {
+        counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
+    };
+    for (name, cell) in [("with a fault", faulted), ("without a fault", nominal)] {
+        if cell.flights == 0 {
+            continue;
+        }
+        let idle = if cell.idle > 0 { format!(", in {} the fault changed nothing", cell.idle) } else { String::new() };
+        outln!("\n{} {name}: {} passed, {} failed{idle}", cell.flights, cell.passed(), cell.failed);
+        cell.rates().iter().for_each(|(what, rate)| outln!("  {what:<20} {:>6}  {rate}", rate.count));
+    }
+    outln!("\nends: {}", counts(outcomes));
+    if !violations.is_empty() {
+        outln!("invariants violated: {}", counts(violations));
+    }
+    if !never_began.is_empty() {
+        outln!("moments that NEVER CAME, with how many flights waited for them: {}", counts(never_began));
+    }
+    if all.cuts > 0 {
+        let right = all.cuts - all.needless;
+        outln!("\nmotors stopped in the air in {} flights: {right} rightly, {} needlessly", all.cuts, all.needless);
+        for (name, cell) in cuts {
+            outln!("  {name:<20} {:>6}  needless {:>4}  {}", cell.cuts, cell.needless, cell.needless_cuts());
+        }
+    }
+}
+
 /// Why a file cannot be kept.
 fn other_campaign(path: &Path, found: &str, wanted: &str) -> String {
-    let parsed = |text: &str| serde_json::from_str(text).unwrap_or(serde_json::Value::Null);
+    let parsed = |text: &str| serde_json::from_str(text).unwrap_or(Value::Null);
     let (found, wanted) = (parsed(found), parsed(wanted));
     let different = |name: &&str| found[*name] != wanted[*name];
     let what = ["vehicle", "plan", "shard", "shards", "version", "program"].into_iter().find(different);

@@ -8,6 +8,10 @@ use stampfly_sim::fault::{FaultKind, FaultValue};
 use stampfly_sim::vehicle::Vehicle;
 use std::process::ExitCode;
 
+/// What stands before the table of sizes.
+const SIZES: &str =
+    "## Sizes\n\nThe random flights of a campaign draw the size of a fault evenly in its logarithm, from these:";
+
 pub fn run(options: &TopicsOptions) -> Result<ExitCode, Failure> {
     vehicles::with(&options.vehicle.name, Faults(options))?
 }
@@ -33,6 +37,7 @@ fn print(options: &TopicsOptions, table: &[FaultKind]) {
                     "name": kind.name, "unit": kind.value.unit(), "default": kind.value.default(),
                     "range": kind.value.range(), "takes_value": kind.value.range().is_some(),
                     "expected": kind.expected.name(), "above": above, "meaning": kind.meaning,
+                    "sizes": kind.sizes.map(|sizes| json!({ "range": sizes.range, "shown": sizes.to_string(), "reason": sizes.reason })),
                 })
             })
             .collect();
@@ -42,6 +47,13 @@ fn print(options: &TopicsOptions, table: &[FaultKind]) {
         for kind in table {
             let [value, range] = texts(kind);
             outln!("| `{}` | {value} | {range} | {} | {} |", kind.name, expected(kind), kind.meaning);
+        }
+        let sized: Vec<_> = table.iter().filter_map(|kind| Some((kind, kind.sizes?))).collect();
+        if !sized.is_empty() {
+            outln!("\n{SIZES}\n\n| fault | sizes | from what to what |\n|---|---|---|");
+        }
+        for (kind, sizes) in sized {
+            outln!("| `{}` | {} | {} |", kind.name, format!("{sizes} {}", kind.value.unit()).trim_end(), sizes.reason);
         }
     } else {
         outln!("{:<15} {:<12} {:<26} meaning", "fault", "value", "acceptable up to");

@@ -49,11 +49,13 @@ impl ForVehicle for Again<'_> {
         let setup = V::setup(&case.options, case.seed)?;
         let (flown, recorder) = fly_and_write::<V>(options, &case.options, case.seed, &setup, here::<V>)?;
         let again = campaign::flight::finished(Row::of(&case), &flown, recorder.hash());
+        let again = campaign::flight::with_cut_judged::<V>(again, &case);
         let digest = campaign::flight::digest::<V>(&setup);
         let same = again.log_hash == row.log_hash;
         if options.scene.json {
             let mut object = figures(&flown, recorder.hash());
             object.insert("verdict".into(), json!(again.verdict));
+            object.insert("flown_on".into(), json!(again.flown_on));
             object.insert("recorded_hash".into(), json!(row.log_hash));
             object.insert("same".into(), json!(same));
             object.insert("line".into(), json!(case.line()));
@@ -61,6 +63,9 @@ impl ForVehicle for Again<'_> {
         } else {
             outln!("{}\n", case.line());
             flown.outcome.story().iter().for_each(|line| outln!("  {line}"));
+            if let Some(end) = &again.flown_on {
+                outln!("\nflown on where the motors were stopped in the air, by --fly-on, it ends as {end}");
+            }
             outln!("\nverdict  {}, recorded {}", again.verdict, row.verdict);
             outln!("hash     {}, recorded {}", again.log_hash, row.log_hash);
             if !same {

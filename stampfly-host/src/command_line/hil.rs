@@ -19,6 +19,9 @@ pub fn run(options: &HilOptions) -> Result<ExitCode, Failure> {
     if options.fly.from.is_some() {
         return Err("a flight of a campaign is flown again here: stampfly fly --from".into());
     }
+    if options.fly.fly_on {
+        return Err("--fly-on: a real vehicle's protections stop its motors".into());
+    }
     if options.fly.scene.list {
         return fly::run(&options.fly);
     }

@@ -2,6 +2,7 @@
 //! a flight did not end well.
 
 use crate::campaign::parallel;
+use crate::campaign::rate::Rate;
 use crate::campaign::sticks::{Flight, Sum, cells, files, fly_one, sums};
 use crate::command_line::arguments::CampaignOptions;
 use crate::command_line::failure::Failure;
@@ -54,6 +55,7 @@ fn print_json(flights: &[Flight], sums: &[Sum]) {
         "{}",
         json!({
             "flights": flights.len(), "ended_well": flights.iter().filter(|flight| flight.ended_well).count(),
+            "well": rate(flights), "unhindered": unhindered(flights),
             "while_sound": total(sums, |sum| &sum.while_sound), "cells": sums, "each": flights,
         })
     );
@@ -69,8 +71,9 @@ fn print(flights: &[Flight], sums: &[Sum], wall: f64) {
         let (ends, sound) = (counts(outcomes), counts(while_sound));
         outln!("{:<widest$} {mode:<10} {flights:>7} {ended_well:>5}  {ends:<34} {sound}", name(file));
     }
-    let well = flights.iter().filter(|flight| flight.ended_well).count();
-    outln!("\n{well} of {} flights ended well", flights.len());
+    let (well, unhindered) = (rate(flights), unhindered(flights));
+    outln!("\n{} of {} flights ended well, {well}", well.count, well.of);
+    outln!("{} without anything done to a sound vehicle, {unhindered}", unhindered.count);
     for (who, total) in [
         ("sound vehicles", total(sums, |sum| &sum.while_sound)),
         ("vehicles that were not sound", total(sums, |sum| &sum.while_not_sound)),
@@ -92,6 +95,17 @@ fn print(flights: &[Flight], sums: &[Sum], wall: f64) {
     }
     let simulated: f64 = flights.iter().map(|flight| flight.duration_s).sum();
     outln!("\n{simulated:.0} s flown in {wall:.1} s");
+}
+
+/// How many ended well.
+fn rate(flights: &[Flight]) -> Rate {
+    Rate::of(flights.iter().filter(|flight| flight.ended_well).count(), flights.len())
+}
+
+/// In how many the vehicle did nothing by itself while it was sound.
+fn unhindered(flights: &[Flight]) -> Rate {
+    let is_unhindered = |flight: &&Flight| !flight.interventions.iter().any(|one| one.sound);
+    Rate::of(flights.iter().filter(is_unhindered).count(), flights.len())
 }
 
 fn counts(counts: &BTreeMap<String, usize>) -> String {

@@ -80,8 +80,8 @@ fn kinds() -> Vec<Kind> {
 
 /// Two rows of a campaign, as their file.
 fn flights() -> Vec<u8> {
-    let plan = Plan { seed: 1, flights: 2, pairs: false, only: Vec::new(), options: Options::default() };
-    let cases = Cases::new::<StampFly>(&plan);
+    let plan = Plan { seed: 1, flights: 2, pairs: false, drawn: false, only: Vec::new(), options: Options::default() };
+    let cases = Cases::new::<StampFly>(&plan).expect("a campaign");
     let rows: Vec<_> = (0..40).map(|index| Row { verdict: "flew".into(), ..Row::of(&cases.case(index)) }).collect();
     let path = folder("every_file", "rows").join("rows.parquet");
     file::write(&path, "identity", &rows).expect("written");

@@ -6,12 +6,13 @@ use serde_json::Value;
 use stampfly_board::simulation::StampFly;
 use stampfly_host::campaign::case::{Case, Cases, Plan};
 use stampfly_host::campaign::flight::fly_case;
-use stampfly_host::campaign::row::{Column, IDLE, Kind, PASSED, Row};
+use stampfly_host::campaign::rate::Rate;
+use stampfly_host::campaign::row::{Column, IDLE, Kind, NEEDLESS_CUT, PASSED, Row};
 use stampfly_host::campaign::shard::Shard;
 use stampfly_host::campaign::shrink::shrink;
 use stampfly_host::campaign::summary::Summary;
 use stampfly_host::campaign::{file, parallel};
-use stampfly_sim::fault::{Fault, Moment};
+use stampfly_sim::fault::{Fault, FaultValue, Moment};
 use stampfly_sim::vehicle::{Options, Vehicle};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,7 +24,30 @@ use std::process::Command;
 const HOP: &str = "arm; takeoff 0.3; land";
 
 fn plan(flights: u64, pairs: bool) -> Plan {
-    Plan { seed: 7, flights, pairs, only: Vec::new(), options: Options::default() }
+    Plan { seed: 7, flights, pairs, drawn: false, only: Vec::new(), options: Options::default() }
+}
+
+fn cases(plan: &Plan) -> Cases {
+    Cases::new::<StampFly>(plan).expect("a campaign")
+}
+
+/// The moments that come in some mission of a campaign, in each mode.
+fn comes(options: &Options) -> Vec<Vec<Moment>> {
+    let modes = [None].into_iter().chain(StampFly::VARIETY.modes.iter().copied().map(Some));
+    let variety = StampFly::VARIETY;
+    let missions: Vec<Option<&str>> = match options.mission {
+        Some(_) => vec![None],
+        None => variety.missions.iter().chain(variety.occasions).copied().map(Some).collect(),
+    };
+    let of_mode = |mode: Option<&str>| {
+        let comes = missions.iter().flat_map(|mission| {
+            let mission = mission.map(str::to_owned).or_else(|| options.mission.clone());
+            StampFly::moments(&Options { mission, pilot: mode.map(str::to_owned), ..Options::default() }, 1)
+        });
+        let comes: Vec<_> = comes.collect();
+        Moment::ALL.into_iter().filter(|moment| comes.contains(moment)).collect()
+    };
+    modes.map(of_mode).collect()
 }
 
 /// An empty folder of this test's own.
@@ -56,26 +80,56 @@ fn json(ran: &Ran) -> Value {
 
 #[test]
 fn the_first_flights_are_every_fault_at_every_moment_in_every_mode() {
-    let cases = Cases::new::<StampFly>(&plan(0, false));
-    let modes = 1 + StampFly::VARIETY.modes.len();
-    let all = StampFly::FAULTS.len() * Moment::ALL.len() * modes;
-    assert_eq!(cases.cells(), all);
+    let cases = cases(&plan(0, false));
+    let all = cases.cells();
     let cell = |index| {
-        let Options { fault, pilot, .. } = cases.case(index as u64).options;
-        (fault, pilot)
+        let Options { fault, pilot, mission, .. } = cases.case(index as u64).options;
+        (fault, pilot, mission)
     };
-    assert_eq!((0..all).map(cell).collect::<BTreeSet<_>>().len(), all, "no cell twice");
-    // A campaign that is cut short has seen every fault and every moment.
-    let soon: Vec<_> = (0..StampFly::FAULTS.len()).map(|index| Row::of(&cases.case(index as u64))).collect();
+    let cells: BTreeSet<_> = (0..all).map(cell).collect();
+    assert_eq!(cells.len(), all, "no cell twice");
+    let comes = comes(&Options::default());
+    let faulted = cells.iter().filter(|(fault, ..)| !fault.is_empty()).count();
+    assert_eq!(faulted, StampFly::FAULTS.len() * comes.iter().map(Vec::len).sum::<usize>());
+    assert_eq!(comes.concat().iter().map(|moment| moment.name()).collect::<BTreeSet<_>>().len(), Moment::ALL.len());
+    // First every mission without a fault, in every mode.
+    let nominal = (0..all).take_while(|index| cell(*index).0.is_empty()).count();
+    assert_eq!((nominal + faulted, (10..40).contains(&nominal)), (all, true), "{nominal}");
+    // A campaign that is cut short has seen every fault and every moment of a program's flights.
+    let soon: Vec<_> =
+        (nominal..nominal + StampFly::FAULTS.len()).map(|index| Row::of(&cases.case(index as u64))).collect();
     assert_eq!(soon.iter().map(|row| &row.fault).collect::<BTreeSet<_>>().len(), StampFly::FAULTS.len());
-    assert_eq!(soon.iter().map(|row| &row.phase).collect::<BTreeSet<_>>().len(), Moment::ALL.len());
+    assert_eq!(soon.iter().map(|row| &row.phase).collect::<BTreeSet<_>>().len(), comes[0].len());
+}
+
+#[test]
+fn every_flight_has_a_mission_in_which_its_moments_come() {
+    let cells = cases(&plan(0, true));
+    let drawn = cases(&Plan { drawn: true, ..plan(0, true) });
+    let all = (0..cells.cells() as u64).map(|index| cells.case(index));
+    for case in all.chain((0..2_000).map(|index| drawn.case(index))) {
+        let comes = StampFly::moments(&case.options, case.seed);
+        for phase in Row::of(&case).phase.split('+').filter(|phase| !["", "time"].contains(phase)) {
+            assert!(comes.iter().any(|moment| moment.name() == phase), "{}", case.line());
+        }
+    }
+}
+
+#[test]
+fn a_campaign_with_a_mission_has_the_moments_of_that_one() {
+    let options = Options { mission: Some("arm; takeoff 1.5; hover 2; flip left; land".into()), ..Options::default() };
+    let cases = cases(&Plan { options: options.clone(), ..plan(0, false) });
+    let phases: BTreeSet<_> = (0..cases.cells()).map(|index| Row::of(&cases.case(index as u64)).phase).collect();
+    assert!(phases.contains("flip") && !phases.contains("chop") && !phases.contains("move"), "{phases:?}");
+    let faults: usize = comes(&options).iter().map(|moments| moments.len() * StampFly::FAULTS.len()).sum();
+    assert_eq!(cases.cells(), faults + 1 + StampFly::VARIETY.modes.len());
 }
 
 #[test]
 fn confined_to_two_faults_all_flights_walk_through_their_cells_again_and_again() {
     let only = ["tof-stuck=0.03", "flow-bias"].map(String::from).to_vec();
-    let cases = Cases::new::<StampFly>(&Plan { only, ..plan(0, false) });
-    let round = 2 * Moment::ALL.len() * (1 + StampFly::VARIETY.modes.len());
+    let cases = cases(&Plan { only, ..plan(0, false) });
+    let round = 2 * comes(&Options::default()).iter().map(Vec::len).sum::<usize>();
     assert_eq!(cases.cells(), round);
     let cell = |index: usize| {
         let case = cases.case(index as u64);
@@ -94,19 +148,84 @@ fn confined_to_two_faults_all_flights_walk_through_their_cells_again_and_again()
 
 #[test]
 fn random_flights_can_be_flown_and_vary() {
-    let cases = Cases::new::<StampFly>(&plan(0, true));
+    let cases = cases(&plan(0, true));
     let drawn: Vec<_> = (0..2_000).map(|index| cases.case(cases.cells() as u64 + index)).collect();
     for case in &drawn {
         StampFly::setup(&case.options, case.seed).expect("a flight");
     }
     let share = |holds: &dyn Fn(&Case) -> bool| drawn.iter().filter(|case| holds(case)).count() as f64 / 2_000.0;
     let near = |share: f64, expected: f64| (share - expected).abs() < 0.05;
-    assert!(near(share(&|case| case.options.fault.len() == 2), 0.5));
+    assert!(near(share(&|case| case.options.fault.is_empty()), 0.1));
+    assert!(near(share(&|case| case.options.fault.len() == 2), 0.45));
     assert!(near(share(&|case| case.options.pilot.is_none()), 0.2));
-    assert!(near(share(&|case| case.options.mission.as_deref() == Some("random")), 1.0 / 3.0));
-    assert!(near(share(&|case| case.options.fault[0].contains('+')), 0.5));
-    let lone = Cases::new::<StampFly>(&plan(0, false));
-    assert!((0..500).all(|index| lone.case(lone.cells() as u64 + index).options.fault.len() == 1));
+    let missions = StampFly::VARIETY.missions.len() + StampFly::VARIETY.occasions.len();
+    assert!(near(share(&|case| case.options.mission.as_deref() == Some("random")), 1.0 / missions as f64));
+    assert!(near(share(&|case| case.options.fault.first().is_some_and(|fault| fault.contains('+'))), 0.45));
+    let lone = self::cases(&plan(0, false));
+    assert!((0..500).all(|index| lone.case(lone.cells() as u64 + index).options.fault.len() <= 1));
+    // A campaign of drawn flights has the same from its first on.
+    let all = self::cases(&Plan { drawn: true, ..plan(0, true) });
+    assert_eq!(all.cells(), 0);
+    let first = Plan { seed: 7 + cases.cells() as u64, drawn: true, ..plan(0, true) };
+    assert_eq!(self::cases(&first).case(0).arguments(), drawn[0].arguments());
+}
+
+/// Sizes of each fault in drawn flights, as shares of the logarithm of its range.
+fn shares(flights: u64) -> BTreeMap<&'static str, Vec<f64>> {
+    let cases = cases(&Plan { drawn: true, ..plan(0, true) });
+    let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for text in (0..flights).flat_map(|index| cases.case(index).options.fault) {
+        let fault = Fault::parse(&text, StampFly::FAULTS).expect("a fault");
+        let (Some(sizes), Some(value)) = (fault.kind.sizes, fault.value) else { continue };
+        let [low, high] = sizes.range;
+        // Three digits, and a reciprocal of them.
+        let size = sizes.measure.size(value);
+        assert!((low * 0.99..=high * 1.01).contains(&size), "{text}");
+        shares.entry(fault.kind.name).or_default().push((size / low).ln() / (high / low).ln());
+    }
+    shares
+}
+
+#[test]
+fn sizes_are_drawn_evenly_in_their_logarithm() {
+    let shares = shares(20_000);
+    let sized = StampFly::FAULTS.iter().filter(|kind| kind.sizes.is_some()).count();
+    assert_eq!(shares.len(), sized);
+    for (fault, mut shares) in shares.clone() {
+        shares.sort_by(f64::total_cmp);
+        let n = shares.len() as f64;
+        let apart = shares.iter().enumerate().map(|(place, share)| (share - (place as f64 + 0.5) / n).abs());
+        let apart = apart.fold(0.0, f64::max);
+        // Kolmogorov and Smirnov: of so many faults one is beyond 1.63/√n by chance; none is beyond 2.2/√n.
+        assert!(n > 100.0 && apart < 2.2 / n.sqrt(), "{fault}: {apart} with {n} sizes");
+    }
+    // All together, by tenths.
+    let all: Vec<_> = shares.into_values().flatten().collect();
+    for tenth in 0..10 {
+        let count = all.iter().filter(|share| ((**share * 10.0) as usize).min(9) == tenth).count() as f64;
+        assert!((0.9..1.1).contains(&(count * 10.0 / all.len() as f64)), "{tenth}: {count} of {}", all.len());
+    }
+}
+
+#[test]
+fn every_fault_with_a_number_has_plausible_sizes() {
+    let mut noise = stampfly_sim::Noise::new(1, 1);
+    for table in
+        [StampFly::FAULTS, stampfly_stm32_quad::simulation::faults::FAULTS, stampfly_plane::simulation::faults::FAULTS]
+    {
+        for kind in table {
+            let (Some([low, high]), Some(sizes)) = (kind.value.range(), kind.sizes) else {
+                assert_eq!((kind.value, kind.sizes), (FaultValue::None, None), "{}", kind.name);
+                continue;
+            };
+            let [smallest, largest] = sizes.range;
+            assert!(0.0 < smallest && smallest < largest && sizes.reason.contains(" to "), "{}", kind.name);
+            for _ in 0..200 {
+                let value = sizes.draw(&mut noise);
+                assert!((low..=high).contains(&value), "{}: {value}", kind.name);
+            }
+        }
+    }
 }
 
 proptest! {
@@ -114,9 +233,9 @@ proptest! {
 
     #[test]
     fn a_flight_does_not_depend_on_how_the_campaign_is_divided(count in 1u64..50, index in 0u64..100_000) {
-        let one = Cases::new::<StampFly>(&plan(100_000, true));
+        let one = cases(&plan(100_000, true));
         // Another plan in the number of flights is the same flight, too.
-        let other = Cases::new::<StampFly>(&plan(index + 1, true));
+        let other = cases(&plan(index + 1, true));
         let shard = Shard::new(index % count, count).expect("a shard");
         prop_assert!(shard.flights(100_000).any(|flight| flight == index));
         prop_assert_eq!(one.case(index).arguments(), other.case(index).arguments());
@@ -130,7 +249,7 @@ proptest! {
             plant: vec!["mass=0.04".into()],
             ..Options::default()
         };
-        let cases = Cases::new::<StampFly>(&Plan { options, ..plan(0, true) });
+        let cases = cases(&Plan { options, ..plan(0, true) });
         let case = cases.case(index);
         let again = Row::of(&case).case().expect("a case");
         prop_assert_eq!(again.arguments(), case.arguments());
@@ -141,7 +260,7 @@ proptest! {
 #[test]
 fn rows_survive_a_file() {
     let path = folder("rows").join("rows.parquet");
-    let cases = Cases::new::<StampFly>(&plan(0, true));
+    let cases = cases(&plan(0, true));
     let rows: Vec<Row> = (0..500)
         .map(|index| Row {
             seed: u64::MAX - index,
@@ -161,6 +280,20 @@ fn rows_survive_a_file() {
     assert_eq!(file::read(&path).expect("read").rows, []);
     let left: Vec<_> = fs::read_dir(path.parent().expect("a folder")).expect("a folder").collect();
     assert_eq!(left.len(), 1, "no other file is left");
+}
+
+/// Columns that may be empty, and that files of version 0.2 do not have.
+#[test]
+fn rows_of_an_earlier_version_are_read() {
+    let row = Row { seed: 3, reason: Some("it fell".into()), flown_on: Some("landed".into()), ..Row::default() };
+    let without = |missing: &[&str]| {
+        let named = Row::common().into_iter().map(|column| column.name).zip(row.values());
+        Row::from_values(named.filter(|(name, _)| !missing.contains(&name.as_str())))
+    };
+    let new = ["reason", "never_began", "cut_by", "flown_on"];
+    assert_eq!(without(&new), Ok(Row { seed: 3, ..Row::default() }));
+    assert_eq!(without(&[]), Ok(row.clone()));
+    assert_eq!(without(&["outcome"]), Err("there is no column outcome".into()));
 }
 
 #[test]
@@ -224,7 +357,7 @@ fn what_is_needed_stays() {
         faults.filter_map(|fault| fault.value).next()
     };
     let smallest = shrink::<StampFly>(&case, &mut |case| value(case) == Some(0.07));
-    assert_eq!(smallest.options.fault, ["tof-outliers=0.07@ground+0.05"]);
+    assert_eq!(smallest.options.fault, ["tof-outliers=0.07@calibration+0.05"]);
 }
 
 #[test]
@@ -255,7 +388,41 @@ fn failures_are_grouped_and_cells_counted() {
     assert!(summary.failures[0].line.ends_with("--fault imu-silent@hover"));
     assert_eq!(summary.pairs.len(), 1);
     let csv = summary.csv(StampFly::FAULTS);
-    assert!(csv.contains("imu-silent,hover,3,0,2,0,2,kept-on\n") && csv.lines().count() == 4, "{csv}");
+    assert!(csv.contains("imu-silent,hover,3,0,2,0,2,kept-on,0,0,") && csv.lines().count() == 4, "{csv}");
+}
+
+#[test]
+fn flights_without_a_fault_and_cuts_are_counted_apart() {
+    let row = |fault: &str, verdict: &str, cut_by: Option<&str>, flown_on: Option<&str>| Row {
+        fault: fault.into(),
+        phase: if fault.is_empty() { String::new() } else { "hover".into() },
+        faults: if fault.is_empty() { String::new() } else { format!("{fault}@hover") },
+        verdict: verdict.into(),
+        outcome: "cut".into(),
+        as_expected: true,
+        cut_by: cut_by.map(str::to_owned),
+        flown_on: flown_on.map(str::to_owned),
+        never_began: (verdict == IDLE).then(|| "flip".into()),
+        ..Row::default()
+    };
+    let rows = [
+        row("", PASSED, None, None),
+        row("", "landed", None, None),
+        row("wall", PASSED, Some("IMPACT"), Some("crashed")),
+        row("wall", NEEDLESS_CUT, Some("IMPACT"), Some("landed")),
+        row("wall", PASSED, Some("IMPACT"), None),
+        row("hand", IDLE, None, None),
+    ];
+    let summary = Summary::of(&rows);
+    assert_eq!((summary.nominal.flights, summary.nominal.failed), (2, 1));
+    assert_eq!(summary.nominal.failing(), Rate::of(1, 2));
+    assert_eq!((summary.faulted.flights, summary.faulted.idle, summary.faulted.failing()), (4, 1, Rate::of(1, 3)));
+    assert_eq!(summary.all.needless_cuts(), Rate::of(1, 2), "of the third nothing is known");
+    assert_eq!(summary.cuts["IMPACT"].needless_cuts(), Rate::of(1, 2));
+    assert_eq!(summary.needless_by_fault()["wall"], Rate::of(1, 2));
+    assert_eq!(summary.never_began["flip"], 1);
+    assert!(!summary.cells.contains_key(&(String::new(), String::new())), "no fault is none of the table");
+    assert!(summary.csv(StampFly::FAULTS).contains("\nnone,,2,0,0,0,1,"));
 }
 
 #[test]
@@ -314,10 +481,7 @@ fn shards_and_one_run_give_the_same_rows() {
 
 #[test]
 fn rows_do_not_depend_on_threads() {
-    let cases = Cases::new::<StampFly>(&Plan {
-        options: Options { mission: Some(HOP.into()), ..Options::default() },
-        ..plan(6, false)
-    });
+    let cases = cases(&Plan { options: Options { mission: Some(HOP.into()), ..Options::default() }, ..plan(6, false) });
     let rows = |threads| parallel::each(6, threads, &|index| fly_case::<StampFly>(&cases.case(index as u64)).ok());
     assert_eq!(rows(1), rows(3));
     assert_eq!(parallel::workers(5, NonZero::new(2)), 2);

@@ -80,7 +80,7 @@ fn the_flight_task_publishes_what_the_hosts_loop_does() {
             time.sleep_until(time.now() + Duration::from_millis(20)).await;
         }
     });
-    tasks.spawn(ground_station::fly(Radio::undisturbed(&clock, link), &setup.mission, false, &progress));
+    tasks.spawn(ground_station::fly(Radio::undisturbed(&clock, link), &setup.mission, false, &progress, None));
     let publish = |at, data: &_| {
         to_imu.publish(at, data);
     };

@@ -57,8 +57,8 @@ fn a_fault_that_changes_nothing_is_found() {
 }
 
 #[test]
-fn every_moment_comes_in_its_order() {
-    let faults: Vec<_> = Moment::ALL.iter().map(|moment| format!("mag-bent=5@{}+0.1", moment.name())).collect();
+fn the_usual_moments_come_in_their_order() {
+    let faults: Vec<_> = Moment::USUAL.iter().map(|moment| format!("mag-bent=5@{}+0.1", moment.name())).collect();
     let faults: Vec<_> = faults.iter().map(String::as_str).collect();
     let mission = "arm\ntakeoff 0.4\nhover 2\ngoto 0.8 0 0.4\nland\n";
     for pilot in [None, Some(FlightMode::PosHold), Some(FlightMode::Stabilize)] {

@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`FaultKind`], [`Fault`] | a row of a vehicle's table; one fault of one flight |
 //! | [`When`], [`Moment`] | when it begins |
+//! | [`Sizes`], [`Measure`] | how large it plausibly is, and the draw of a campaign |
 //! | [`Injector`] | which faults are active now, and how often each has changed something |
 //! | [`Distortion`], [`Line`] | what happens to samples on their way to the bus |
 //!
@@ -20,12 +21,14 @@ mod class;
 mod distortion;
 mod injector;
 mod line;
+mod sizes;
 mod when;
 
 pub use class::Class;
 pub use distortion::{Distortion, Effect};
 pub use injector::Injector;
 pub use line::Line;
+pub use sizes::{Measure, Sizes};
 pub use when::{Moment, When};
 
 use core::fmt;
@@ -93,19 +96,25 @@ pub struct FaultKind {
     pub name: &'static str,
     /// What its number means.
     pub value: FaultValue,
+    /// From which sizes a campaign draws its number; without, the number is always the default.
+    pub sizes: Option<Sizes>,
     /// The worst end that is acceptable with the default value.
     pub expected: Class,
-    /// The worst end that is acceptable above a value, where it is another.
+    /// The worst end that is acceptable above a size, where it is another.
     pub above: Option<(f64, Class)>,
     /// What happens.
     pub meaning: &'static str,
 }
 
 impl FaultKind {
+    const fn new(name: &'static str, value: FaultValue, expected: Class, meaning: &'static str) -> Self {
+        Self { name, value, sizes: None, expected, above: None, meaning }
+    }
+
     /// A fault without a number.
     #[must_use]
     pub const fn plain(name: &'static str, expected: Class, meaning: &'static str) -> Self {
-        Self { name, value: FaultValue::None, expected, above: None, meaning }
+        Self::new(name, FaultValue::None, expected, meaning)
     }
 
     /// A fault with a number: unit, default, lowest, highest.
@@ -116,7 +125,7 @@ impl FaultKind {
         expected: Class,
         meaning: &'static str,
     ) -> Self {
-        Self { name, value: FaultValue::Number { unit, default, range: [low, high] }, expected, above: None, meaning }
+        Self::new(name, FaultValue::Number { unit, default, range: [low, high] }, expected, meaning)
     }
 
     /// A fault with a number, which without one keeps the last value: unit, lowest, highest.
@@ -127,13 +136,25 @@ impl FaultKind {
         expected: Class,
         meaning: &'static str,
     ) -> Self {
-        Self { name, value: FaultValue::OrLast { unit, range: [low, high] }, expected, above: None, meaning }
+        Self::new(name, FaultValue::OrLast { unit, range: [low, high] }, expected, meaning)
     }
 
-    /// The same, with another acceptable end above a value.
+    /// The same, with another acceptable end above a size.
     #[must_use]
-    pub const fn above(self, value: f64, expected: Class) -> Self {
-        Self { above: Some((value, expected)), ..self }
+    pub const fn above(self, size: f64, expected: Class) -> Self {
+        Self { above: Some((size, expected)), ..self }
+    }
+
+    /// The same, with a number that a campaign draws from sizes of this measure and range, for this reason.
+    #[must_use]
+    pub const fn sized(self, measure: Measure, range: [f64; 2], reason: &'static str) -> Self {
+        Self { sizes: Some(Sizes { measure, range, reason }), ..self }
+    }
+
+    /// The size of a fault with this number.
+    #[must_use]
+    pub fn size(&self, number: f64) -> f64 {
+        self.sizes.map_or(number, |sizes| sizes.measure.size(number))
     }
 }
 
@@ -210,7 +231,7 @@ impl Fault {
     #[must_use]
     pub fn expected(&self) -> Class {
         match (self.kind.above, self.value) {
-            (Some((limit, class)), Some(value)) if value > limit => class,
+            (Some((limit, class)), Some(value)) if self.kind.size(value) > limit => class,
             _ => self.kind.expected,
         }
     }
@@ -291,7 +312,9 @@ mod tests {
 
     const TABLE: &[FaultKind] = &[
         FaultKind::plain("silent", Class::Cut, "Nothing comes."),
-        FaultKind::number("bias", ("m", 0.5, -1.0, 1.0), Class::Degraded, "It is off.").above(0.8, Class::Landed),
+        FaultKind::number("bias", ("m", 0.5, -1.0, 1.0), Class::Degraded, "It is off.")
+            .sized(Measure::EitherWay, [0.01, 1.0], "a test")
+            .above(0.8, Class::Landed),
         FaultKind::or_last("stuck", ("m", 0.0, 2.0), Class::Degraded, "It stays."),
     ];
 
@@ -330,7 +353,7 @@ mod tests {
         for value in ["2", "x", "NaN", "inf", ""] {
             assert!(message(&format!("bias={value}@hover")).contains("is no number from -1 to 1 m"), "{value}");
         }
-        assert!(message("silent@noon").contains("'noon' is none of ground, spool"));
+        assert!(message("silent@noon").contains("'noon' is none of calibration, ground, spool"));
         assert!(message("silent@-1").contains("'-1' is none of"));
         assert!(message("silent@hover+x").contains("'x' is no number of seconds"));
         let nothing = Fault::parse("silent@hover", &[]).expect_err("a mistake").to_string();
@@ -338,8 +361,9 @@ mod tests {
     }
 
     #[test]
-    fn a_larger_value_may_have_another_acceptable_end() {
+    fn a_larger_size_may_have_another_acceptable_end() {
         let expected = |text| Fault::parse(text, TABLE).expect("a fault").expected();
-        assert_eq!([expected("bias@1"), expected("bias=0.9@1")], [Class::Degraded, Class::Landed]);
+        assert_eq!(["bias@1", "bias=-0.7@1"].map(expected), [Class::Degraded; 2]);
+        assert_eq!(["bias=0.9@1", "bias=-0.9@1"].map(expected), [Class::Landed; 2], "either way");
     }
 }

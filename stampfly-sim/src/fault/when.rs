@@ -4,8 +4,14 @@ use core::fmt;
 use stampfly_types::Duration;
 
 /// A moment of a flight. The vehicle's surroundings say when it has come.
+///
+/// [`USUAL`](Self::USUAL) ones come in every flight that takes off, flies to a place and lands. The others come where somebody
+/// does what they are about, and where the vehicle has it: a vehicle says which come in a flight
+/// ([`Vehicle::moments`](crate::vehicle::Vehicle::moments)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
+    /// The still calibration after power-on begins.
+    Calibration,
     /// It stands and may be armed. It is armed two seconds later, so that a fault can be noticed before.
     Ground,
     /// The motors begin to turn.
@@ -16,6 +22,14 @@ pub enum Moment {
     Hover,
     /// It flies to another place.
     Move,
+    /// It begins to turn over.
+    Flip,
+    /// The flight mode changes in the air.
+    Mode,
+    /// The throttle stick is pulled to its lowest in the air.
+    Chop,
+    /// A parameter is changed.
+    Parameter,
     /// It sinks, in order to land.
     Landing,
     /// It touches the ground, landing.
@@ -24,18 +38,39 @@ pub enum Moment {
 
 impl Moment {
     /// Every moment, in the order of a flight.
-    pub const ALL: [Self; 7] =
+    pub const ALL: [Self; 12] = [
+        Self::Calibration,
+        Self::Ground,
+        Self::Spool,
+        Self::TakeOff,
+        Self::Hover,
+        Self::Move,
+        Self::Flip,
+        Self::Mode,
+        Self::Chop,
+        Self::Parameter,
+        Self::Landing,
+        Self::Touch,
+    ];
+
+    /// Those of a flight that takes off, flies to a place and lands, in their order.
+    pub const USUAL: [Self; 7] =
         [Self::Ground, Self::Spool, Self::TakeOff, Self::Hover, Self::Move, Self::Landing, Self::Touch];
 
     /// Its name in texts.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Calibration => "calibration",
             Self::Ground => "ground",
             Self::Spool => "spool",
             Self::TakeOff => "takeoff",
             Self::Hover => "hover",
             Self::Move => "move",
+            Self::Flip => "flip",
+            Self::Mode => "mode",
+            Self::Chop => "chop",
+            Self::Parameter => "parameter",
             Self::Landing => "landing",
             Self::Touch => "touch",
         }

@@ -38,7 +38,7 @@ pub use witness::Witness;
 
 use crate::SimulationConfig;
 use crate::ask;
-use crate::fault::{Fault, FaultKind};
+use crate::fault::{Fault, FaultKind, Moment};
 use crate::plant::Airframe;
 use crate::sticks::StickOptions;
 use crate::time::{Clock, Tasks};
@@ -265,6 +265,9 @@ pub struct Options {
     /// Fly what is in a stick file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sticks: Option<StickOptions>,
+    /// Fly on where a protection stops the motors in the air: to find out whether that was right. A simulator's option alone.
+    #[serde(skip_serializing_if = "core::ops::Not::not")]
+    pub flies_on: bool,
     /// Fly what other programs ask for; not written down, because it is not repeatable.
     #[serde(skip)]
     pub live: Option<Live>,
@@ -351,8 +354,10 @@ pub struct Setting {
 pub struct Variety {
     /// Flight modes of a pilot, as [`Options::pilot`] takes them.
     pub modes: &'static [&'static str],
-    /// Missions, as [`Options::mission`] takes them; the first is short and has every moment at which a fault can begin.
+    /// Missions, as [`Options::mission`] takes them; the first is short and has every usual moment at which a fault can begin.
     pub missions: &'static [&'static str],
+    /// Missions for the moments that do not come in those, in the order in which they are looked through for one.
+    pub occasions: &'static [&'static str],
     /// Faults that begin at a time begin within these, s since power-on: from before the vehicle is armed until the shortest mission is about to land.
     pub times: [u16; 2],
     /// Can the real drivers run over emulated chips?
@@ -361,7 +366,7 @@ pub struct Variety {
 
 impl Variety {
     /// Nothing is varied.
-    pub const NONE: Self = Self { modes: &[], missions: &[], times: [3, 12], chips: false };
+    pub const NONE: Self = Self { modes: &[], missions: &[], occasions: &[], times: [3, 12], chips: false };
 }
 
 /// A vehicle's golden flight: how it is flown, and how its record is judged.
@@ -485,6 +490,11 @@ pub trait Vehicle: 'static {
     /// Its golden flight, if it has one.
     fn golden() -> Option<Golden<Self>> {
         None
+    }
+
+    /// The moments that come in a flight of these options when nothing goes wrong, in their order. By default the usual ones.
+    fn moments(_options: &Options, _seed: u64) -> Vec<Moment> {
+        Moment::USUAL.to_vec()
     }
 
     /// Missions that are over earlier than the one of these options, as [`Options::mission`] takes them, shortest first: for

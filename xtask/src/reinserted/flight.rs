@@ -14,8 +14,8 @@ const PANICKED: &str = "panicked";
 /// Where the drivers are.
 const DRIVERS: &str = "stampfly-drivers/";
 /// Campaigns that look for a flight: the first has every fault, the second every moment of a program's flight, the last every
-/// mode and some at random.
-const CAMPAIGNS: [&str; 3] = ["60", "420", "2000"];
+/// mode and some at random. Flights without a fault come before all of them.
+const CAMPAIGNS: [&str; 3] = ["90", "600", "3000"];
 
 /// Other seeds with which a flight is flown again, and in how many of them it has to show the bug: a flight at the edge ends
 /// otherwise whatever is changed, and says nothing about what was.

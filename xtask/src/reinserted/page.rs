@@ -7,7 +7,7 @@ use std::fmt::Write;
 pub const PLACE: (&str, &str, &str) =
     ("docs/safety.md", "<!-- bugs: cargo xtask docs --fix -->\n", "<!-- end of bugs -->");
 
-/// The table. A row begins with no code: in this document such rows are known failures of the campaign.
+/// The table.
 pub fn table(bugs: &[Bug]) -> String {
     let (found, missed): (Vec<_>, Vec<_>) = bugs.iter().partition(|bug| bug.flight.is_some());
     let mut text = format!("\nFound: {} of {} tried.\n", found.len(), bugs.len());
@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_row_is_taken_for_a_known_failure() {
+    fn bugs_that_were_found_have_their_flight_and_others_a_reason() {
         let [name, what] = ["sign", "a | b"].map(str::to_owned);
         let missed = Bug { name, what, ..Bug::default() };
         let flight = Some("stampfly fly --seed 7".to_owned());
@@ -45,6 +45,5 @@ mod tests {
         let table = table(&[found, missed]);
         assert!(table.contains("Found: 1 of 2 tried.") && table.contains("| `--seed 7` | crashed |"), "{table}");
         assert!(table.contains("a \\| b | not looked into |"));
-        assert!(!table.contains("\n| `"));
     }
 }

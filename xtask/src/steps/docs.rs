@@ -11,6 +11,7 @@
 //! | front pages of crates | description, keywords, categories, all features documented on sites and named in the README |
 //! | changelogs | each published crate has an entry for its version, under one for what comes next |
 //! | the tables of re-inserted bugs, mutants and controls | they are what the lists in `xtask/*.toml` say; `--fix` writes them |
+//! | the tables of campaigns | they are what `xtask/safety.json` says; `--fix` writes them. When the golden flight has changed since they were flown, that is said |
 //!
 //! Every document is checked that git tracks or would add.
 
@@ -25,6 +26,8 @@ use crate::page::Page;
 use crate::reinserted::list::List;
 use crate::reinserted::page as bugs;
 use crate::repository::{Failure, Repository, capture};
+use crate::safety::page as safety;
+use crate::safety::results::{Results, golden};
 use std::fs;
 use std::path::Path;
 
@@ -59,9 +62,9 @@ const GENERATED: &[(&str, &str, &str)] = &[
         "docs/faults.md",
         "faults",
         "# Faults\n\nWhat can go wrong in a simulated flight of the StampFly: `stampfly fly --fault NAME[=VALUE]@WHEN[+SECONDS]`. \
-         Printed from the table in `stampfly-board/src/simulation/faults/table.rs` by `cargo xtask docs --fix`.\n\nWHEN is `ground`, \
-         `spool`, `takeoff`, `hover`, `move`, `landing`, `touch`, or a number of seconds after power-on; a fault lasts for \
-         SECONDS, or to the end of the flight. How a flight may end, from best to worst: refused, transparent, degraded, \
+         Printed from the table in `stampfly-board/src/simulation/faults/table.rs` by `cargo xtask docs --fix`.\n\nWHEN is \
+         `calibration`, `ground`, `spool`, `takeoff`, `hover`, `move`, `flip`, `mode`, `chop`, `parameter`, `landing`, `touch`, or a number of seconds after \
+         power-on; a fault lasts for SECONDS, or to the end of the flight. How a flight may end, from best to worst: refused, transparent, degraded, \
          landed, cut; crashed, flown-away and kept-on are never acceptable. The rules are in \
          `stampfly-board/src/simulation/judge/mod.rs`.",
     ),
@@ -122,6 +125,16 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     failures.extend(stale(repository, place, &format!("\n{doors}\n"), arguments.fix)?);
     for (place, table) in [(bugs::PLACE, bugs), (mutants::PLACE, mutants), (control::PLACE, controls)] {
         failures.extend(stale(repository, place, &table, arguments.fix)?);
+    }
+    let campaigns = Results::read(repository)?;
+    for (place, table) in safety::tables(&campaigns) {
+        failures.extend(stale(repository, place, &table, arguments.fix)?);
+    }
+    // Flown again in an hour, and not for every change of a gain: said, and no failure.
+    if golden(repository)? != campaigns.golden {
+        println!(
+            "docs/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety` flies them again"
+        );
     }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
 }

@@ -44,6 +44,7 @@ pub mod python;
 pub mod qemu;
 pub mod record;
 pub mod s3_memory;
+pub mod safety;
 pub mod search;
 pub mod semver;
 pub mod shards;

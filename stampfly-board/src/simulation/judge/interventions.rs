@@ -62,6 +62,9 @@ pub struct Intervention {
     pub tilt_deg: f64,
     /// Between the true vertical and the estimated one, degrees.
     pub attitude_error_deg: f64,
+    /// It was an alert that stops motors in any phase, or the cut-off.
+    #[serde(skip)]
+    pub by_protection: bool,
 }
 
 impl Intervention {
@@ -114,6 +117,11 @@ impl Interventions {
     /// All of them, in order.
     pub fn list(&self) -> &[Intervention] {
         &self.list
+    }
+
+    /// The first one that stopped the motors in the air for a protection's sake.
+    pub fn cut_in_air(&self) -> Option<&Intervention> {
+        self.list.iter().find(|one| one.action == "cut" && one.by_protection && one.height_m > OFF_GROUND.into())
     }
 
     /// Looks at the truth.
@@ -197,7 +205,8 @@ impl Interventions {
     }
 
     fn note(&mut self, at: Instant, action: &'static str, alert: String, needless: bool) {
-        let State { sound, height, speed, tilt, attitude_error, .. } = self.soundness.state();
+        let state = self.soundness.state();
+        let State { sound, height, speed, .. } = state;
         self.list.push(Intervention {
             t_s: at.seconds_f64(),
             alert,
@@ -205,8 +214,9 @@ impl Interventions {
             sound: sound && needless,
             height_m: height.into(),
             speed_mps: speed.into(),
-            tilt_deg: f64::from(tilt.to_degrees()),
-            attitude_error_deg: f64::from(attitude_error.to_degrees()),
+            tilt_deg: f64::from(state.tilt().to_degrees()),
+            attitude_error_deg: f64::from(state.attitude_error().to_degrees()),
+            by_protection: self.cut_off || self.alerts.intersects(CUT),
         });
     }
 }

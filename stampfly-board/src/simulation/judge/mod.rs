@@ -25,6 +25,9 @@
 //! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound. Where
 //! the file begins armed, `refused` is not.
 //!
+//! A flight that [flies on](VehicleConfig::flies_on) where a protection would have stopped its motors in the air is over as
+//! soon as it has crashed or flown away, and ends as that.
+//!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
 mod course;
@@ -129,6 +132,9 @@ pub struct Judgement {
     pub alerts: Vec<AlertSpan>,
     /// What the vehicle did by itself that changed the flight, in order.
     pub interventions: Vec<Intervention>,
+    /// The protections that stopped the motors in the air, the first time that some did: alerts with `+` between two, or
+    /// `CUT_OFF`.
+    pub cut_in_air: Option<String>,
     /// Faults, as they were given.
     pub faults: Vec<FaultSpan>,
 }
@@ -150,6 +156,8 @@ pub(super) struct Judge {
     sticks: Option<bool>,
     moments: Moments,
     course: Course,
+    /// Protections stop no motors in the air: such a flight is over when it is lost.
+    flies_on: bool,
     /// How many times as wide the bounds of `transparent` are.
     wide: f32,
     alerts: Alerts,
@@ -191,18 +199,20 @@ pub(super) struct Judge {
 
 impl Judge {
     pub fn new(injector: &Injector, mission: &Mission, pilot: Option<FlightMode>, config: &VehicleConfig) -> Self {
+        let course = Course::new(mission, config.mode.flip_room);
         Self {
             injector: injector.clone(),
             invariants: Invariants::new(config.mode.hover_without_link),
             interventions: Interventions::new(injector, config),
             sticks: None,
             moments: Moments::default(),
-            course: Course::new(mission),
             wide: match pilot {
                 None => 1.0,
-                Some(FlightMode::PosHold) => PILOT,
+                Some(mode) if course.modes().chain([mode]).all(|mode| mode == FlightMode::PosHold) => PILOT,
                 Some(_) => BY_SIGHT,
             },
+            course,
+            flies_on: config.flies_on,
             alerts: Alerts::NONE,
             spans: Vec::new(),
             motors_on: false,
@@ -241,6 +251,7 @@ impl Judge {
     pub fn published(&mut self, id: Id, at: Instant, words: &[u32]) {
         self.invariants.published(id, at, words);
         self.interventions.published(id, at, words);
+        self.moments.published(&self.injector, id, at, words);
         if id == Id::system_alert
             && let Some(alert) = message::<SystemAlert>(words)
         {
@@ -332,7 +343,7 @@ impl Judge {
         }
         if status.phase == FlightPhase::Flying {
             let mode = *self.mode.get_or_insert(status.mode);
-            self.other_mode |= after_fault && mode != status.mode;
+            self.other_mode |= after_fault && mode != status.mode && !self.course.asks_for(status.mode);
         }
         let coasted = self.stopped.is_some_and(|(at, _)| now.since(at) > COAST);
         self.runs_on |= coasted && truth.rotor_speed.iter().any(|speed| *speed > TURNS);
@@ -340,8 +351,12 @@ impl Judge {
         self.last = Some(*truth);
     }
 
-    /// Is there nothing more to come of a fault? The motors are off, and whoever commands waits for something else.
+    /// Is there nothing more to come of a fault? The motors are off, and whoever commands waits for something else. Or it flies
+    /// on to see what comes of it, and has crashed or flown away.
     pub fn is_over(&self, now: Instant) -> bool {
+        if self.flies_on && (self.flew_away().is_some() || self.crash(self.injector.first_begun(now)).is_some()) {
+            return true;
+        }
         let Some(begun) = self.injector.first_begun(now) else { return false };
         let since = self.stopped.map_or(begun, |(at, _)| at.max(begun));
         let [off, idle, fallen] = OVER;
@@ -402,6 +417,7 @@ impl Judge {
             cut_height_m: stopped.map(|(_, height)| height),
             alerts: self.spans,
             interventions: self.interventions.list().to_vec(),
+            cut_in_air: self.interventions.cut_in_air().map(|one| one.alert.clone()),
             faults,
         }
     }
@@ -432,16 +448,16 @@ impl Judge {
             return (Class::Refused, "the motors never turned".into());
         }
         let [above, beside] = self.away;
-        if above > AWAY[0] {
-            return (Class::FlownAway, format!("{above:.1} m above the highest height that was commanded"));
+        if let Some(reason) = self.flew_away() {
+            return (Class::FlownAway, reason);
         }
-        if beside > AWAY[1] {
-            return (Class::FlownAway, format!("{beside:.1} m beside the path that was commanded"));
+        let crash = self.crash(begun);
+        if let Some(crash) = crash.as_ref().filter(|_| self.flies_on) {
+            return (Class::Crashed, crash.clone());
         }
         if self.motors_on {
             return (Class::KeptOn, "the motors were on at the end".into());
         }
-        let crash = self.crash(begun);
         if let Some((at, height)) = self.stopped {
             let at_the_end = !self.stopped_early && height <= OFF_GROUND && crash.is_none();
             if !at_the_end && (self.stopped_by_fault(at) || self.stopped_by_blow) {
@@ -467,6 +483,18 @@ impl Judge {
             return (Class::Transparent, String::new());
         };
         (Class::Degraded, reason)
+    }
+
+    /// Where it has flown to, if that is away.
+    fn flew_away(&self) -> Option<String> {
+        let [above, beside] = self.away;
+        if above > AWAY[0] {
+            Some(format!("{above:.1} m above the highest height that was commanded"))
+        } else if beside > AWAY[1] {
+            Some(format!("{beside:.1} m beside the path that was commanded"))
+        } else {
+            None
+        }
     }
 
     /// The same for a flight by a stick file.

@@ -28,10 +28,10 @@ pub(super) use services::Services;
 use crate::VehicleConfig;
 use crate::console::Newest;
 use crate::simulation::faults::FAULTS;
+use crate::simulation::settings::Waiting;
 use crate::topics::{Id, TOPICS};
 use stampfly_drivers::chip::pmw3901;
 use stampfly_flight::compact::Chunks;
-use stampfly_flight::live::Change;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::MAX_BODY;
 use stampfly_services::cable::BODY;
@@ -108,7 +108,7 @@ pub(super) struct Seen {
     /// Parameters that were kept for the next start.
     pub kept: RefCell<Option<VehicleConfig>>,
     /// Parameters that have changed, for the moment when the vehicle is at rest and disarmed.
-    pub changed: RefCell<Option<Change<VehicleConfig>>>,
+    pub changed: Waiting,
     /// Who is sent the flight record, and what of it waits to be sent.
     pub tape: RefCell<Tape<Client>>,
     pub chunks: RefCell<VecDeque<Vec<u8>>>,

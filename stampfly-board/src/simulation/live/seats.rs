@@ -3,9 +3,8 @@
 use super::Seen;
 use crate::VehicleConfig;
 use crate::console::Command;
-use crate::messages::ParameterChange;
-use crate::parameters;
 use crate::simulation::radio::Radio;
+use crate::simulation::settings::tell;
 use crate::topics::ConsoleEnds;
 use stampfly_flight::console;
 use stampfly_flight::console::calibrate::Calibrate;
@@ -71,17 +70,7 @@ impl Hands for Board<'_> {
     /// Tells what of the parameters has changed, whoever has changed it.
     fn poll(&mut self, now: Instant, _: bool) {
         let Self { told, config, console, seen, .. } = self;
-        let lines = |name: &str| parameters::holders(name).iter().map(|line| *line as usize);
-        let change = told.changes(config, lines, &mut |index, value| {
-            console.parameter_change.publish(now, &ParameterChange { index: index as u32, value });
-        });
-        if let Some(change) = change {
-            let earlier = seen.changed.take();
-            seen.changed.replace(Some(match &earlier {
-                Some(earlier) => change.after(earlier),
-                None => change,
-            }));
-        }
+        tell(now, told, config, console, &seen.changed);
     }
 }
 

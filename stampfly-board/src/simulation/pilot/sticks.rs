@@ -16,7 +16,7 @@
 //! has begun is left to itself. A file whose vehicle is disarmed is over when no row turns the arm
 //! switch on again.
 
-use super::{PERIOD, Pilot};
+use super::{ALIVE, PERIOD, Pilot};
 use crate::simulation::ground_station::Progress;
 use crate::simulation::mission::{Mission, Step};
 use stampfly_sim::sticks::{Player, Start, Sticks};
@@ -32,8 +32,6 @@ const RESTS: f32 = 2.0;
 const HELD_TO: f32 = 2.5;
 /// A deflection that names the direction of a flip.
 const NAMES: f32 = 0.2;
-/// A program that has asked for something says as often as this that it is still there, frames.
-const ALIVE: u32 = 5;
 /// Sticks that were let go stay so for this long before the arm switch is turned off.
 const LET_GO: Duration = Duration::from_secs(2);
 /// No landing takes longer: the vehicle's own limit is 30 s and the height at 0.15 m/s, and this is

@@ -16,15 +16,16 @@ pub struct CampaignOptions {
     /// `--mission random --flights 500`.
     #[arg(long)]
     pub consistency: bool,
-    /// How many flights; 2000 with `--faults`. With `--sticks`, how many of each file in each mode;
+    /// How many flights; 3000 with `--faults`. With `--sticks`, how many of each file in each mode;
     /// 3.
-    #[arg(long, value_name = "N", default_value_t = 100, default_value_ifs([("faults", "true".into(), "2000"), ("sticks", ArgPredicate::IsPresent, "3")]), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, default_value_ifs([("faults", "true".into(), "3000"), ("sticks", ArgPredicate::IsPresent, "3")]), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub flights: u64,
     /// Seed of the first flight; the others count up from there.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Fly through what can go wrong: every fault at every moment in every mode, then faults, values, moments, missions and
-    /// surroundings at random. Every flight must end as its fault allows (`stampfly faults`).
+    /// Fly through what can go wrong: every fault at every moment in every mode, then faults, sizes, moments, missions and
+    /// surroundings at random, one in ten without a fault. Every flight must end as its fault allows (`stampfly faults`), and
+    /// motors that were stopped in the air must have been stopped rightly: flown on, the same flight must have ended badly.
     #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot"])]
     pub faults: bool,
     #[command(flatten)]
@@ -42,9 +43,12 @@ pub struct CampaignOptions {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Campaign of faults")]
 pub struct FaultCampaignOptions {
-    /// Let half of the random flights have two faults.
+    /// Let half of the random flights with a fault have two.
     #[arg(long, requires = "faults")]
     pub pairs: bool,
+    /// Let all flights be random ones: leave out those with the usual values at every moment in every mode.
+    #[arg(long, requires = "faults", conflicts_with = "only")]
+    pub drawn: bool,
     /// Confine all flights to these faults: each at every moment in every mode, again and again with other seeds.
     #[arg(long, value_name = "NAME[=VALUE],…", value_delimiter = ',', requires = "faults", conflicts_with = "pairs")]
     pub only: Vec<String>,

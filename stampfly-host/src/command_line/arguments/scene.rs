@@ -40,8 +40,8 @@ pub struct SceneOptions {
     /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
     #[arg(long)]
     pub cameras: bool,
-    /// Let something go wrong; may be repeated. WHEN is ground, spool, takeoff, hover, move, landing, touch, or a number of
-    /// seconds; +SECONDS is how long it lasts (see `stampfly faults`).
+    /// Let something go wrong; may be repeated. WHEN is calibration, ground, spool, takeoff, hover, move, flip, mode, chop,
+    /// parameter, landing, touch, or a number of seconds; +SECONDS is how long it lasts (see `stampfly faults`).
     #[arg(long, value_name = "NAME[=VALUE]@WHEN[+SECONDS]")]
     pub fault: Vec<String>,
     /// Fly the mission with the sticks of a simulated pilot.
@@ -73,6 +73,10 @@ pub struct FlyOptions {
     pub sticks: Option<PathBuf>,
     #[command(flatten)]
     pub with_sticks: StickArguments,
+    /// Fly on where a protection stops the motors in the air, to see whether that was right: its alert comes, and the motors
+    /// turn on.
+    #[arg(long)]
+    pub fly_on: bool,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -80,7 +84,7 @@ pub struct FlyOptions {
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
     /// Fly a flight of a campaign again, and compare its hash: exit code 1 when it is another.
-    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "world", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "sticks", "jitter", "seed"])]
+    #[arg(long, value_name = "FILE", requires = "row", conflicts_with_all = ["mission", "plant", "world", "param", "vibration", "gust", "wind", "chips", "cameras", "fault", "pilot", "sticks", "jitter", "seed", "fly_on"])]
     pub from: Option<PathBuf>,
     /// Which one: its row in the file, from 0.
     #[arg(long, value_name = "N", requires = "from")]
@@ -90,7 +94,7 @@ pub struct FlyOptions {
 impl Default for FlyOptions {
     fn default() -> Self {
         let (scene, with_sticks) = (SceneOptions::default(), StickArguments::default());
-        Self { scene, sticks: None, with_sticks, seed: 1, out: ".".into(), from: None, row: None }
+        Self { scene, sticks: None, with_sticks, fly_on: false, seed: 1, out: ".".into(), from: None, row: None }
     }
 }
 
@@ -98,7 +102,8 @@ impl FlyOptions {
     /// The flight these options describe, as a vehicle takes them.
     pub fn options(&self) -> Options {
         let sticks = |file: &PathBuf| self.with_sticks.options(file, self.scene.mode.clone());
-        Options { sticks: self.sticks.as_ref().map(sticks), ..self.scene.options(self.scene.jitter) }
+        let flown = self.scene.options(self.scene.jitter);
+        Options { sticks: self.sticks.as_ref().map(sticks), flies_on: self.fly_on, ..flown }
     }
 }
 
@@ -135,6 +140,7 @@ impl SceneOptions {
             fault,
             pilot,
             sticks: None,
+            flies_on: false,
             live: None,
         }
     }

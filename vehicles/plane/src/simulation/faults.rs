@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 use stampfly_sim::World;
-use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
+use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line, Measure};
 use stampfly_sim::plant::{Aeroplane, RotorFault, Surface};
 use stampfly_types::{Duration, Instant, Message};
 use std::prelude::v1::*;
@@ -17,7 +17,8 @@ pub const FAULTS: &[FaultKind] = &[
     FaultKind::plain("mag-silent", Class::Degraded, "The compass says nothing."),
     FaultKind::plain("baro-silent", Class::Degraded, "The barometer says nothing."),
     FaultKind::plain("imu-silent", Class::Cut, "No inertial sample arrives."),
-    FaultKind::number("gyro-bias", ("rad/s", 0.02, -0.5, 0.5), Class::Degraded, "The roll rate is too high by this."),
+    FaultKind::number("gyro-bias", ("rad/s", 0.02, -0.5, 0.5), Class::Degraded, "The roll rate is too high by this.")
+        .sized(Measure::EitherWay, [0.005, 0.5], "what a calibration leaves to half a radian a second, after a blow"),
     FaultKind::plain("link-lost", Class::Landed, "Nobody is heard."),
     FaultKind::plain("aileron-jammed", Class::Degraded, "The right aileron stays in its middle."),
     FaultKind::plain("imu-stuck", Class::Cut, "Inertial samples repeat the last one."),
@@ -26,20 +27,23 @@ pub const FAULTS: &[FaultKind] = &[
         ("m/s^2", 0.5, -30.0, 30.0),
         Class::Degraded,
         "The vertical acceleration is too high by this.",
-    ),
+    )
+    .sized(Measure::EitherWay, [0.1, 10.0], "the data sheet's offset to one gravity, after a blow"),
     FaultKind::plain("propeller-lost", Class::Landed, "The propeller has no thrust."),
     FaultKind::number(
         "elevator-jammed",
         ("", 0.0, -1.0, 1.0),
         Class::Cut,
         "The elevator stays at this share of its deflection.",
-    ),
+    )
+    .sized(Measure::EitherWay, [0.02, 1.0], "a servo's dead zone to its end"),
     FaultKind::number(
         "rudder-jammed",
         ("", 0.0, -1.0, 1.0),
         Class::Degraded,
         "The rudder, and the nose wheel with it, stay at this share of their deflection.",
-    ),
+    )
+    .sized(Measure::EitherWay, [0.02, 1.0], "a servo's dead zone to its end"),
 ];
 
 /// What is wrong in one flight.

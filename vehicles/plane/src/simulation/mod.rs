@@ -46,8 +46,7 @@ impl Vehicle for Plane {
     const NAME: &'static str = "plane";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety =
-        Variety { modes: &[], missions: &["hop", "round", "twice"], times: [3, 120], chips: false };
+    const VARIETY: Variety = Variety { missions: &["hop", "round", "twice"], times: [3, 120], ..Variety::NONE };
     const PORTS: &'static [PortSpec] = services::PORTS;
     const PAGE: Page = page::PAGE;
     type Runnables = Runnables;
@@ -61,6 +60,9 @@ impl Vehicle for Plane {
         }
         if options.sticks.is_some() {
             return Err("this vehicle has no sticks: it flies missions".into());
+        }
+        if options.flies_on {
+            return Err("--fly-on: this vehicle does not offer it".into());
         }
         let wind = WindConfig { gust: 0.3, ..WindConfig::MEADOW };
         let new = SimulationConfig::new(plant::PLANT);

@@ -47,6 +47,9 @@ impl Vehicle for Rover {
         if options.sticks.is_some() {
             return Err("the rover has no sticks: its missions say who drives, and how".into());
         }
+        if options.flies_on {
+            return Err("--fly-on: a rover does not fly".into());
+        }
         if !plant.is_empty()
             || *world != WorldKind::Gentle
             || vibration.is_some()

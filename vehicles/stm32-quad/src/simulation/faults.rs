@@ -3,7 +3,7 @@
 use core::cell::Cell;
 use stampfly_sim::World;
 use stampfly_sim::chips::Air;
-use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
+use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line, Measure};
 use stampfly_sim::plant::{Beyond, Motion, Plant, RotorFault, Scene};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, Instant};
@@ -12,15 +12,20 @@ use std::prelude::v1::*;
 /// Every fault. It has one inertial sensor and a pilot who sees it: what takes either away ends the flight.
 pub const FAULTS: &[FaultKind] = &[
     FaultKind::plain("imu-silent", Class::Cut, "No inertial sample arrives."),
-    FaultKind::number("gyro-bias", ("rad/s", 0.1, -1.0, 1.0), Class::Degraded, "The roll rate is too high by this."),
+    FaultKind::number("gyro-bias", ("rad/s", 0.1, -1.0, 1.0), Class::Degraded, "The roll rate is too high by this.")
+        .sized(Measure::EitherWay, [0.01, 1.0], "what a calibration leaves to a fifteenth of the range, after a blow"),
     FaultKind::number(
         "accel-bias",
         ("m/s^2", 1.0, -5.0, 5.0),
         Class::Degraded,
         "The forward acceleration is too high by this.",
-    ),
+    )
+    .sized(Measure::EitherWay, [0.1, 5.0], "the data sheet's offset to half a gravity, after a blow"),
     FaultKind::plain("link-lost", Class::Cut, "No packet arrives."),
-    FaultKind::number("link-loss", ("", 0.3, 0.0, 1.0), Class::Transparent, "This share of packets is lost."),
+    // With six of ten lost, ten running are lost about once a second, and a tenth of a second is a pilot's reaction.
+    FaultKind::number("link-loss", ("", 0.3, 0.0, 1.0), Class::Transparent, "This share of packets is lost.")
+        .sized(Measure::Number, [0.01, 1.0], "a quiet room to one in which nothing gets through")
+        .above(0.6, Class::Cut),
     // With less than half of a rotor the others cannot hold it level.
     FaultKind::number(
         "motor-weak",
@@ -28,6 +33,7 @@ pub const FAULTS: &[FaultKind] = &[
         Class::Degraded,
         "The first motor's propeller lacks this share of its thrust.",
     )
+    .sized(Measure::Number, [0.02, 1.0], "a nick in a blade to a propeller that has come off")
     .above(0.5, Class::Cut),
     FaultKind::plain("imu-stuck", Class::Cut, "Inertial samples repeat the last one."),
     FaultKind::number(
@@ -35,15 +41,19 @@ pub const FAULTS: &[FaultKind] = &[
         ("", 1.0, 0.0, 1.0),
         Class::Cut,
         "The first motor turns at this duty whatever is commanded.",
-    ),
-    FaultKind::number("wall", ("m", 0.4, 0.1, 10.0), Class::Cut, "There is a wall this far ahead of the vehicle."),
-    FaultKind::number("ceiling", ("m", 0.2, 0.05, 10.0), Class::Cut, "There is a ceiling this far above the vehicle."),
+    )
+    .sized(Measure::Number, [0.05, 1.0], "a controller that drags to one that no longer listens"),
+    FaultKind::number("wall", ("m", 0.4, 0.1, 10.0), Class::Cut, "There is a wall this far ahead of the vehicle.")
+        .sized(Measure::Number, [0.1, 3.0], "just beside the propellers to as far as a mission goes"),
+    FaultKind::number("ceiling", ("m", 0.2, 0.05, 10.0), Class::Cut, "There is a ceiling this far above the vehicle.")
+        .sized(Measure::Number, [0.05, 2.0], "just above it to more than a mission climbs"),
     FaultKind::number(
         "slope",
         ("", 0.2, -1.0, 1.0),
         Class::Degraded,
         "The floor rises by this for each metre to the north.",
-    ),
+    )
+    .sized(Measure::EitherWay, [0.02, 0.35], "a meadow to 20 deg, on which it does not stand"),
 ];
 
 /// The plant's rotor that is the document's first motor.

@@ -76,8 +76,13 @@ impl Vehicle for Stm32Quad {
     const NAME: &'static str = "stm32-quad";
     const BESIDE: &'static [Topic] = &[Topic { name: "truth", fields: Truth::FIELDS }];
     const FAULTS: &'static [FaultKind] = faults::FAULTS;
-    const VARIETY: Variety =
-        Variety { modes: &["angle", "acro"], missions: &["square", "hover"], times: [3, 20], chips: true };
+    const VARIETY: Variety = Variety {
+        modes: &["angle", "acro"],
+        missions: &["square", "hover"],
+        times: [3, 20],
+        chips: true,
+        ..Variety::NONE
+    };
     const PORTS: &'static [PortSpec] = serial::PORTS;
     const ASKS: &'static [&'static str] = serial::ASKS;
     const PAGE: Page = page::PAGE;
@@ -89,6 +94,9 @@ impl Vehicle for Stm32Quad {
         let Options { mission, chips, cameras, jitter, live, pilot, .. } = options;
         if *cameras {
             return Err("this vehicle has no cameras".into());
+        }
+        if options.flies_on {
+            return Err("--fly-on: this vehicle does not offer it".into());
         }
         let mut simulation = SimulationConfig { seed, vibration: VIBRATION, ..SimulationConfig::new(plant::PLANT) };
         options.change(&mut simulation)?;
