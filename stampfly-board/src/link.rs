@@ -5,15 +5,18 @@
 //!
 //! Who commands is the [`Helm`]'s decision, the same one that services ask: a station has a seat of its own, [`Seat::Link`], and the paired transmitter
 //! [`Seat::Transmitter`]. A station whose command or sticks are refused is told who commands, and a station in session is told what others ask of the vehicle.
+//!
+//! A command is acknowledged when the vehicle's state shows that it has happened, as at a cable, and refused with the reason when it does not: see [`deed`](stampfly_services::deed).
 
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
 use core::fmt::{Display, Write as _};
 use heapless::String;
-use stampfly_link::secure::{Guarded, Heard, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
+use stampfly_link::secure::{Guarded, Heard, Held, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
+use stampfly_services::deed::{Deed, TOO_MANY, Waited};
 use stampfly_services::{Helm, Passed, Refusal, Seat, Told};
-use stampfly_types::messages::{Alerts, ArmBlocks, FlightStatus, GuidedCommand, GuidedKind, PilotInput};
+use stampfly_types::messages::{Alerts, ArmBlocks, FlightStatus, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 
 /// How often everything in [`Outgoing::ALL`] is asked for: how late a call or an answer may be.
@@ -33,11 +36,23 @@ const NOTICE_TURNS: u8 = 5;
 /// Characters of a refusal or notice: the longest names two numbers of 32 bits.
 const TEXT: usize = 96;
 
-/// Why a frame of the station was not obeyed.
-#[derive(Clone, Copy, Debug)]
+/// Commands that wait to be seen done. A station says one after the other, and a kill before all.
+const WAITS: usize = 4;
+
+/// Why a frame of the station was not obeyed, or a command came to nothing.
+#[derive(Clone, Debug)]
 struct Refused {
     counter: u32,
-    why: Refusal,
+    why: String<TEXT>,
+    /// How often it is still said, and turns since it was.
+    left: u8,
+    turns: u8,
+}
+
+impl Refused {
+    fn new(counter: u32, why: &dyn Display, times: u8) -> Self {
+        Self { counter, why: text(why), left: times, turns: NOTICE_TURNS }
+    }
 }
 
 /// The newest request of another client, for the station.
@@ -60,6 +75,9 @@ pub struct Link<'b> {
     /// Where stations are, and their seats, the newest first.
     stations: [Option<(Address, Seat)>; STATIONS],
     refused: Option<Refused>,
+    /// The newest command with a number that was refused, and why: it is refused again when it is said again.
+    denied: Option<(u32, String<TEXT>)>,
+    waits: [Option<(Held, Waited)>; WAITS],
     sticks_refused: Option<Instant>,
     notice: Notice,
 }
@@ -87,7 +105,17 @@ impl<'b> Link<'b> {
     #[must_use]
     pub const fn new(guarded: Guarded, ends: LinkEnds<'b>) -> Self {
         let (stations, notice) = ([None; STATIONS], Notice { number: 0, told: None, said: 0, turns: 0 });
-        Self { guarded, ends, counter: 0, stations, refused: None, sticks_refused: None, notice }
+        Self {
+            guarded,
+            ends,
+            counter: 0,
+            stations,
+            refused: None,
+            denied: None,
+            waits: [None; WAITS],
+            sticks_refused: None,
+            notice,
+        }
     }
 
     /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands as far as the helm lets them through. What else a station with the
@@ -154,7 +182,7 @@ impl<'b> Link<'b> {
             match self.steer(helm, at, seat, &input) {
                 // What is said once of a command is not overwritten.
                 Err(why) if is_due && self.refused.is_none() => {
-                    (self.sticks_refused, self.refused) = (Some(at), Some(Refused { counter, why }));
+                    (self.sticks_refused, self.refused) = (Some(at), Some(Refused::new(counter, &why, 1)));
                 }
                 Err(_) => {}
                 Ok(()) => self.sticks_refused = None,
@@ -162,18 +190,86 @@ impl<'b> Link<'b> {
             return None;
         }
         let Some(command) = received.payload.command() else { return Some(received) };
-        let taken = match command.kind {
+        match Deed::of(command.kind) {
             // A sign of life, which takes nothing over. The commander's is passed on as it comes.
-            GuidedKind::None => Ok(helm.alive(at, seat) && self.command(at, command)),
-            _ => helm.guide(at, seat, command, &mut |passed| self.pass(at, passed)).map(|()| true),
-        };
-        match taken {
-            Ok(taken) => self.guarded.acknowledge(&received, taken),
-            // It is said again: there may be room then.
-            Err(Refusal::Full) => self.guarded.acknowledge(&received, false),
-            Err(why) => self.refused = Some(Refused { counter, why }),
+            None => {
+                let taken = helm.alive(at, seat) && self.command(at, command);
+                self.guarded.acknowledge(&received, taken);
+            }
+            Some(deed) => self.guide(helm, (at, seat), (counter, deed), &received, command),
         }
         None
+    }
+
+    /// A command: is refused with the reason, or waits to be seen done.
+    fn guide(
+        &mut self,
+        helm: &mut Helm,
+        (at, seat): (Instant, Seat),
+        (counter, deed): (u32, Deed),
+        received: &Received<'_>,
+        command: GuidedCommand,
+    ) {
+        let is_numbered = matches!(received.payload, Payload::Numbered { .. });
+        if is_numbered && let Some((_, why)) = self.denied.as_ref().filter(|(denied, _)| *denied == counter) {
+            // The station has not heard it yet. It is not done when the vehicle's state has changed since: the answer may be on its way.
+            self.refused = Some(Refused::new(counter, why, 1));
+            return;
+        }
+        let mut words = String::<TEXT>::new();
+        if deed.refuse(&self.status(), &mut words) {
+            return self.deny(counter, is_numbered, &words);
+        }
+        if !deed.ends_a_flight() && self.waits.iter().all(Option::is_some) {
+            return self.deny(counter, is_numbered, &TOO_MANY);
+        }
+        let waited = Waited::with(at, deed, self.refusals());
+        match helm.guide(at, seat, command, &mut |passed| self.pass(at, passed)) {
+            Ok(()) => {
+                // A free place, or the oldest one's.
+                let place = self.waits.iter_mut().min_by_key(|place| place.map(|(_, waited)| waited.since()));
+                let held = self.guarded.hold(received);
+                place.into_iter().for_each(|place| *place = held.map(|held| (held, waited)));
+            }
+            // It is said again: there may be room then.
+            Err(Refusal::Full) => self.guarded.acknowledge(received, false),
+            Err(why) => self.deny(counter, is_numbered, &why),
+        }
+    }
+
+    fn deny(&mut self, counter: u32, is_numbered: bool, why: &dyn Display) {
+        if is_numbered {
+            self.denied = Some((counter, text(why)));
+        }
+        self.refused = Some(Refused::new(counter, why, 1));
+    }
+
+    /// Acknowledges a command that is seen to have happened, or says of one why it did not: one in a turn.
+    fn settle(&mut self, now: Instant) {
+        let (status, refusals) = (self.status(), self.refusals());
+        let settled = self.waits.iter_mut().find_map(|place| {
+            let (held, waited) = (*place)?;
+            let result = waited.look_at(now, &status, refusals)?;
+            *place = None;
+            Some((held, result))
+        });
+        let Some((held, result)) = settled else { return };
+        self.guarded.settle(held, result.is_ok());
+        if let Err(why) = result {
+            let mut words = String::<TEXT>::new();
+            // What is too long is cut.
+            _ = write!(words, "refused: {why}");
+            if held.is_numbered() {
+                self.denied = Some((held.counter(), words.clone()));
+            }
+            // A station does not say it again for so long.
+            self.refused = Some(Refused::new(held.counter(), &words, NOTICES));
+        }
+    }
+
+    /// How often the vehicle has refused to arm.
+    fn refusals(&mut self) -> u32 {
+        self.ends.arm_refusals.latest().map_or(0, |sample| sample.data.attempts)
     }
 
     /// Follows the vehicle's state, and passes the signs of life of the seat that has the lease on. The firmware's radio calls it every 20 ms, beside the console's
@@ -239,10 +335,17 @@ impl<'b> Link<'b> {
         self.guarded.seal(now, &notice, room)
     }
 
-    /// Seals why a frame of the station was refused, once.
+    /// Seals why a frame of the station was refused.
     fn refusal<'r>(&mut self, now: Instant, room: &'r mut [u8; MAX_FRAME]) -> Option<(Address, &'r [u8])> {
-        let Refused { counter, why } = self.refused.take()?;
-        self.guarded.seal(now, &Payload::Refusal { counter, why: &text(&why) }, room)
+        let Refused { counter, why, left, .. } = self.refused.take()?;
+        let sealed = self.guarded.seal(now, &Payload::Refusal { counter, why: &why }, room);
+        self.refused = (left > 1).then_some(Refused { counter, why, left: left - 1, turns: 0 });
+        sealed
+    }
+
+    /// Is there a refusal to be said in this turn?
+    fn is_refusal_due(&self) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.turns >= NOTICE_TURNS)
     }
 
     /// Publishes a command, of a station with the key or of a service. Was there room for it?
@@ -270,8 +373,18 @@ impl<'b> Link<'b> {
                 Some((Address::BROADCAST, put(room, &self.guarded.beacon(now)?)?))
             }
             Outgoing::Handshake => Some((Address::BROADCAST, self.guarded.transmit(now, random, room)?)),
-            Outgoing::Acknowledgement if self.refused.is_some() => self.refusal(now, room),
-            Outgoing::Acknowledgement => self.guarded.seal_acknowledgement(now, room),
+            Outgoing::Acknowledgement => {
+                if let Some(refused) = &mut self.refused {
+                    refused.turns = refused.turns.saturating_add(1);
+                }
+                if !self.is_refusal_due() {
+                    self.settle(now);
+                }
+                if self.is_refusal_due() {
+                    return self.refusal(now, room);
+                }
+                self.guarded.seal_acknowledgement(now, room)
+            }
             Outgoing::Telemetry => {
                 self.counter = self.counter.wrapping_add(1);
                 let (at, frame) = self.ends.telemetry.latest().map(|new| (new.at, new.data)).unwrap_or_default();

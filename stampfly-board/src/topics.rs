@@ -60,7 +60,7 @@ stampfly_bus::topics! {
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, calibration, notification, telemetry, link];
     /// Why the vehicle did not arm when it was asked to; for people.
-    arm_refusals: ArmRefusals = latest @ on event from mode => [];
+    arm_refusals: ArmRefusals = latest @ on event from mode => [link];
     /// Contact with the ground, and what take-off and landing ask for.
     land_detected: LandDetected = latest @ 400 Hz from landing => [mode, navigation, control];
 

@@ -27,6 +27,12 @@ use stampfly_types::{Duration, Instant};
 /// half a second, and three times in all.
 pub const SOON: Duration = Duration::from_millis(1_500);
 
+/// As many commands wait to be seen done as may.
+pub const TOO_MANY: &str = "refused: too many commands at once";
+
+/// It waited to be seen done when another came that ends the flight.
+pub const OVERTAKEN: &str = "refused: a later command ends the flight";
+
 /// The vehicle's state says no more.
 pub(crate) const NOT_NOW: &str = "the vehicle does not do it now";
 
@@ -199,19 +205,37 @@ impl Waited {
     /// The vehicle is asked for it now.
     #[must_use]
     pub fn new(now: Instant, deed: Deed, cockpit: &dyn Cockpit) -> Self {
-        Self { deed, since: now, refused: refusals(cockpit) }
+        Self::with(now, deed, refusals(cockpit))
+    }
+
+    /// The same for who has no cockpit: the vehicle has refused to arm so many times.
+    #[must_use]
+    pub const fn with(now: Instant, deed: Deed, refusals: u32) -> Self {
+        Self { deed, since: now, refused: refusals }
+    }
+
+    /// When it was asked for.
+    #[must_use]
+    pub const fn since(&self) -> Instant {
+        self.since
     }
 
     /// What has become of it: done, or why not. `None` while neither is seen.
     #[must_use]
     pub fn look(&self, now: Instant, cockpit: &dyn Cockpit) -> Option<Result<(), &'static str>> {
-        let status = cockpit.view().state();
+        self.look_at(now, &cockpit.view().state(), refusals(cockpit))
+    }
+
+    /// The same for who has no cockpit: the vehicle is in this state, and has refused to arm so many
+    /// times.
+    #[must_use]
+    pub fn look_at(&self, now: Instant, status: &FlightStatus, refusals: u32) -> Option<Result<(), &'static str>> {
         let lands = self.deed == Deed::Disarm && status.phase == FlightPhase::Landing;
-        if lands || self.deed.has_happened(&status) {
+        if lands || self.deed.has_happened(status) {
             return Some(Ok(()));
         }
-        let is_refused = self.deed == Deed::Arm && refusals(cockpit) != self.refused;
-        (is_refused || now.since(self.since) >= SOON).then(|| Err(why_not(&status)))
+        let is_refused = self.deed == Deed::Arm && refusals != self.refused;
+        (is_refused || now.since(self.since) >= SOON).then(|| Err(why_not(status)))
     }
 }
 

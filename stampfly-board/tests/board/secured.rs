@@ -6,8 +6,9 @@ use stampfly_board::topics::{self, Id};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, NotTaken, Payload, Refused, Station, Vehicle};
 use stampfly_services::{Refusal, Seat};
+use stampfly_types::Duration;
 use stampfly_types::messages::{
-    Alerts, CommandSource, FlightStatus, GuidedCommand, GuidedKind, PilotInput, SystemAlert,
+    Alerts, CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, PilotInput, SystemAlert,
 };
 
 const STATION: Address = Address([2, 0, 0, 0, 0, 9]);
@@ -175,6 +176,73 @@ fn a_station_is_refused_while_a_page_commands_and_told_who_does_and_what_was_don
     say(&mut bench, &mut station, &Payload::Numbered { number: 42, command: guided(GuidedKind::Kill) });
     let told = heard(&mut bench, &mut station, 200, |_, _| {});
     assert!(!bench.armed() && told.contains(&"42: true".to_owned()), "{told:?}");
+}
+
+#[test]
+fn what_the_vehicle_does_not_do_is_refused_with_the_reason_and_acknowledged_when_it_has_happened() {
+    let mut bus = topics::Bus::new();
+    let (mut bench, mut station) = ready(&mut bus);
+    let kinds = [GuidedKind::TakeOff, GuidedKind::Hold, GuidedKind::WayPoint, GuidedKind::FlipLeft, GuidedKind::Land];
+    for (number, kind) in (10..).zip(kinds) {
+        let command = Payload::Numbered { number, command: guided(kind) };
+        say(&mut bench, &mut station, &command);
+        let told = heard(&mut bench, &mut station, 200, |_, _| {});
+        let why = if kind == GuidedKind::Land { "it stands on the ground" } else { "motors are off" };
+        assert_eq!(told, [format!("{number}: refused: {why}")], "{kind:?}");
+    }
+    for (number, kind) in [(20, GuidedKind::Arm), (21, GuidedKind::Kill)] {
+        say(&mut bench, &mut station, &Payload::Numbered { number, command: guided(kind) });
+        let told = heard(&mut bench, &mut station, 200, |_, _| {});
+        assert!(told.contains(&format!("{number}: true")), "{kind:?}: {told:?}");
+        assert_eq!(bench.armed(), kind == GuidedKind::Arm);
+    }
+}
+
+#[test]
+fn a_refused_command_that_is_said_again_is_refused_again_although_the_vehicle_would_do_it_now() {
+    let mut bus = topics::Bus::new();
+    let (mut bench, mut station) = ready(&mut bus);
+    let take_off = Payload::Numbered { number: 10, command: guided(GuidedKind::TakeOff) };
+    say(&mut bench, &mut station, &take_off);
+    // It is armed otherwise, and the station has not heard the refusal.
+    assert_eq!(ask(&mut bench, PAGE, GuidedKind::Arm), Ok(()));
+    bench.pass(100, false, &[]);
+    bench.said.clear();
+    assert!(bench.armed());
+    say(&mut bench, &mut station, &take_off);
+    let told = heard(&mut bench, &mut station, 100, |_, _| {});
+    assert!(told.contains(&"10: refused: motors are off".to_owned()), "{told:?}");
+    assert!(bench.armed() && bench.newest::<FlightStatus>(Id::flight_status).phase != FlightPhase::TakeOff);
+}
+
+#[test]
+fn a_command_that_the_vehicle_takes_and_does_not_do_is_refused_three_times_after_a_second_and_a_half() {
+    let mut bus = topics::Bus::new();
+    let (mut bench, mut station) = ready(&mut bus);
+    let arm = Payload::Numbered { number: 10, command: guided(GuidedKind::Arm) };
+    let (mut told, mut room) = (Vec::new(), [0; MAX_FRAME]);
+    // Its mode machine stands still: nothing comes of the command.
+    for turn in 0..150 {
+        // Said again, as long as a station does: it is taken once.
+        if turn < 50 && turn % 3 == 0 {
+            say(&mut bench, &mut station, &arm);
+        }
+        bench.now += Duration::from_millis(20);
+        let now = bench.now;
+        for what in Outgoing::ALL {
+            let Some((_, mut frame)) = bench.say(now, what) else { continue };
+            match station.receive(now, &mut frame).ok().flatten().map(|received| received.payload) {
+                Some(Payload::Refusal { counter: 10, why }) => told.push((turn * 20, why.to_owned())),
+                Some(Payload::Acknowledgement { counter: 10, .. }) => panic!("it is not done, and there was room"),
+                _ => {}
+            }
+        }
+        if let Some(frame) = station.transmit(now, now.as_micros().to_le_bytes(), &mut room).map(<[u8]>::to_vec) {
+            let _ = bench.link.receive(&mut bench.helm, now, STATION, &mut frame.clone());
+        }
+    }
+    assert_eq!(told.len(), 3, "{told:?}");
+    assert!(told.iter().all(|(ms, why)| (1_480..2_000).contains(ms) && why.starts_with("refused: ")), "{told:?}");
 }
 
 #[test]

@@ -15,8 +15,13 @@ pub(super) struct Orders {
     commands: Commands,
     /// Numbers of commands and of the questions that they are.
     asked: VecDeque<(u32, u16)>,
+    /// The same of commands that are not said any more: the vehicle says whether one was done when that is seen, or a second and
+    /// a half later why not.
+    over: VecDeque<(u32, u16)>,
     /// The number of the kill that is being said.
     kill: Option<u32>,
+    /// The number of the command that was refused last: a vehicle says that more than once.
+    refused: Option<u32>,
 }
 
 impl Orders {
@@ -58,19 +63,42 @@ impl Orders {
 
     /// The questions that this acknowledgement answers.
     pub fn acknowledge(&mut self, number: u32, taken: bool) -> Vec<u16> {
-        if self.commands.acknowledge(number, taken) { self.take(number) } else { Vec::new() }
+        match self.commands.acknowledge(number, taken) {
+            true => self.take(number),
+            false if taken => self.take_over(number),
+            // It is said again, or has been given up.
+            false => Vec::new(),
+        }
     }
 
     /// The questions that this refusal answers: the vehicle does not do what is asked, and says why.
     pub fn refuse(&mut self, number: u32) -> Vec<u16> {
-        if self.commands.refuse(number) { self.take(number) } else { Vec::new() }
+        let questions = if self.commands.refuse(number) { self.take(number) } else { self.take_over(number) };
+        if !questions.is_empty() {
+            self.refused = Some(number);
+        }
+        questions
     }
 
-    /// Forgets commands that nobody answers any more. A station knows by itself what is not answered.
+    /// Is this the command that was refused last?
+    pub fn was_refused(&self, number: u32) -> bool {
+        self.refused == Some(number)
+    }
+
+    /// What is not said any more may still be answered. A station knows by itself what was not.
     fn forget(&mut self, now: Instant) {
         while let Some(over) = self.commands.over(now) {
-            self.take(over);
+            for question in self.take(over) {
+                remember(&mut self.over, (over, question));
+            }
         }
+    }
+
+    fn take_over(&mut self, command: u32) -> Vec<u16> {
+        let questions = self.over.iter().filter(|(asked, _)| *asked == command).map(|(_, question)| *question);
+        let questions = questions.collect();
+        self.over.retain(|(asked, _)| *asked != command);
+        questions
     }
 
     /// Takes the questions of a command that is done with.

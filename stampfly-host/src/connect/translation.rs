@@ -156,6 +156,8 @@ impl Translation {
                 }
                 (numbers, *payload)
             }
+            // It comes several times.
+            Payload::Refusal { counter, .. } if self.orders.was_refused(counter) => return,
             Payload::Refusal { counter, why } => match self.orders.refuse(counter) {
                 // Sticks have no question: people are told.
                 numbers if numbers.is_empty() && self.is_news(now, why) => {
@@ -451,6 +453,23 @@ mod tests {
         line.sent.clear();
         line.pass(1_000);
         assert_eq!(line.sent.len(), 0);
+    }
+
+    #[test]
+    fn a_verdict_that_comes_when_a_command_is_not_said_any_more_is_an_answer_once() {
+        let mut line = Line::to(OURS);
+        line.say(2, &guided(GuidedKind::TakeOff));
+        line.pass(1_500);
+        line.sent.clear();
+        let why = "refused: a pilot flies";
+        let refusal = Payload::Refusal { counter: FIRST.wrapping_add(2), why };
+        assert_eq!(line.hear(&refusal), read(&Payload::Reply { text: why, last: true }, 2));
+        assert_eq!(line.hear(&refusal), None, "it comes three times");
+        line.say(3, &guided(GuidedKind::Hold));
+        line.pass(1_500);
+        let done = acknowledgement(FIRST.wrapping_add(3), true);
+        assert_eq!(line.hear(&done), read(&done, 3));
+        assert_eq!(line.hear(&done), None);
     }
 
     #[test]

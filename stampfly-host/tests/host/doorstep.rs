@@ -377,6 +377,11 @@ impl Observer {
         self.sees(SOON, |seen| seen.armed && seen.height > 0.3)
     }
 
+    /// Is it more than 0.3 m above the ground now?
+    pub fn has_climbed(&self) -> bool {
+        self.sees(Duration::ZERO, |seen| seen.armed && seen.height > 0.3)
+    }
+
     /// Has it taken its link for lost?
     pub fn has_no_link(&self, within: Duration) -> bool {
         self.sees(within, |seen| seen.has_no_link)

@@ -12,6 +12,7 @@ mod controllers;
 mod cuts;
 mod determinism;
 mod doctor;
+mod done;
 mod doors;
 mod doorstep;
 mod estimate;

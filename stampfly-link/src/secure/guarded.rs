@@ -7,7 +7,7 @@ use super::frame::{MAX_FRAME, MIN_FRAME};
 use super::payload::Payload;
 use super::received::Received;
 use super::refused::Refused;
-use super::vehicle::Vehicle;
+use super::vehicle::{Held, Vehicle};
 use crate::{Address, PairingPacket, Rejected, Session};
 use core::fmt;
 use stampfly_types::messages::PilotInput;
@@ -226,6 +226,18 @@ impl Guarded {
     pub fn acknowledge(&mut self, received: &Received<'_>, taken: bool) {
         if let Some(vehicle) = &mut self.vehicle {
             vehicle.acknowledge(received, taken);
+        }
+    }
+
+    /// Notes that a command was taken whose effect is not seen yet, see [`Vehicle::hold`].
+    pub fn hold(&mut self, received: &Received<'_>) -> Option<Held> {
+        Some(self.vehicle.as_mut()?.hold(received))
+    }
+
+    /// What became of a command that was held, see [`Vehicle::settle`].
+    pub fn settle(&mut self, held: Held, is_done: bool) {
+        if let Some(vehicle) = &mut self.vehicle {
+            vehicle.settle(held, is_done);
         }
     }
 

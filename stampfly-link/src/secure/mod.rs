@@ -70,11 +70,11 @@
 //! | what | then |
 //! |---|---|
 //! | sticks, samples, telemetry | the next is newer |
-//! | a command | [`Commands`] says it until it is acknowledged; the vehicle takes it once, by its number, in whichever session it hears it |
+//! | a command | [`Commands`] says it until it is acknowledged; the vehicle takes it once, by its number, in whichever session it hears it, and acknowledges it when it is seen to have happened |
 //! | a parameter | ask again: to write it twice is to write it once |
 //! | a line, or a part of its answer | ask again with a [question](Payload::Question) of the same number, from where the answer is missing |
 //! | what is refused with motors armed | the vehicle acknowledges it as refused |
-//! | a command that is refused because another commands | the vehicle says why, each time that it hears it |
+//! | a command that is refused, because another commands or the vehicle does not do it | the vehicle says why, each time that it hears it; of one that it has taken and has not done, three times |
 //! | what was asked of the vehicle, and by whom | the vehicle says it several times, with a number |
 //!
 //! # Floods
@@ -115,4 +115,4 @@ pub use payload::{Payload, Sample};
 pub use received::Received;
 pub use refused::{Refused, SealError, Tally};
 pub use station::Station;
-pub use vehicle::Vehicle;
+pub use vehicle::{Held, Vehicle};

@@ -19,8 +19,8 @@
 //! | C0 sample | vehicle | u16 topic; u64 instant, µs; the words of the message, u32 each |
 //! | C1 chunk | vehicle | a chunk of the flight record, with its number and check sum |
 //! | C2 tables | vehicle | u16 fingerprint of its tables of topics and parameters |
-//! | D0 acknowledgement | vehicle | u32 counter of a frame of the station, of a numbered command its number; u8 whether it was taken |
-//! | D1 refusal | vehicle | u32 as in D0; text: why it was not taken, such as who commands. It is not to be said again |
+//! | D0 acknowledgement | vehicle | u32 counter of a frame of the station, of a numbered command its number; u8 whether it was taken, and a command done |
+//! | D1 refusal | vehicle | u32 as in D0; text: why it was not taken or not done, such as who commands. It is not to be said again |
 //! | D2 notice | vehicle | u32 number of the notice, the same when it comes again; text: what was asked of the vehicle, and by whom |
 //!
 //! Numbers of kinds are hexadecimal. A body has exactly the length of its kind. Numbers are finite and in their range; −0 and

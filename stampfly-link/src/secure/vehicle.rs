@@ -81,6 +81,8 @@ pub struct Vehicle {
     taken: Option<Instant>,
     /// The number of the newest numbered command that was taken.
     numbered: Option<u32>,
+    /// Is it not known yet what became of that one?
+    is_held: bool,
     acknowledgement: Option<Acknowledged>,
     budget: Budget,
     tally: Tally,
@@ -93,6 +95,27 @@ struct Acknowledged {
     counter: u32,
     taken: bool,
     is_number: bool,
+}
+
+/// A command that was taken, and whose effect is not seen yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    counter: u32,
+    is_number: bool,
+}
+
+impl Held {
+    /// The counter of the frame, or the number of its command: what an acknowledgement or a refusal of it names.
+    #[must_use]
+    pub const fn counter(&self) -> u32 {
+        self.counter
+    }
+
+    /// Is that the command's own number?
+    #[must_use]
+    pub const fn is_numbered(&self) -> bool {
+        self.is_number
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -119,6 +142,7 @@ impl Vehicle {
             heard: None,
             taken: None,
             numbered: None,
+            is_held: false,
             acknowledgement: None,
             budget: Budget::new(),
             tally: Tally::default(),
@@ -224,8 +248,10 @@ impl Vehicle {
         if let Payload::Numbered { number, .. } = payload
             && self.numbered == Some(number)
         {
-            // The acknowledgement was lost, or is on its way.
-            self.note(Acknowledged { counter: number, taken: true, is_number: true });
+            // The acknowledgement was lost, or is on its way, or it is not known yet what to say.
+            if !self.is_held {
+                self.note(Acknowledged { counter: number, taken: true, is_number: true });
+            }
             return Ok(None);
         }
         Ok(Some(Received { payload, counter: header.counter, age: age.unwrap_or_default() }))
@@ -308,12 +334,37 @@ impl Vehicle {
     pub fn acknowledge(&mut self, received: &Received<'_>, taken: bool) {
         let acknowledged = match received.payload {
             Payload::Numbered { number, .. } => {
-                self.numbered = if taken { Some(number) } else { self.numbered };
+                if taken {
+                    (self.numbered, self.is_held) = (Some(number), false);
+                }
                 Acknowledged { counter: number, taken, is_number: true }
             }
             _ => Acknowledged { counter: received.counter, taken, is_number: false },
         };
         self.note(acknowledged);
+    }
+
+    /// Notes that a command was taken whose effect is not seen yet. A [numbered](Payload::Numbered) one is not returned again
+    /// and not acknowledged, until [`Vehicle::settle`] says what became of it. Returns what to call it there.
+    pub fn hold(&mut self, received: &Received<'_>) -> Held {
+        let Payload::Numbered { number, .. } = received.payload else {
+            return Held { counter: received.counter, is_number: false };
+        };
+        (self.numbered, self.is_held) = (Some(number), true);
+        Held { counter: number, is_number: true }
+    }
+
+    /// What became of a command that was held. One that was done is to be acknowledged. One that was not is returned again if it is
+    /// said again: the caller says why, and does not do it.
+    pub fn settle(&mut self, held: Held, is_done: bool) {
+        let Held { counter, is_number } = held;
+        if is_number && self.numbered == Some(counter) {
+            self.is_held = false;
+            self.numbered = self.numbered.filter(|_| is_done);
+        }
+        if is_done {
+            self.note(Acknowledged { counter, taken: true, is_number });
+        }
     }
 
     /// Somebody waits for a number: what came in the same turn without one does not take its place.

@@ -239,3 +239,31 @@ fn a_command_that_is_refused_is_not_said_again_and_the_next_one_is() {
     assert!(!commands.refuse(9), "no vehicle refuses a kill");
     assert!(commands.next(now).is_some_and(|payload| payload.is_kill()));
 }
+
+#[test]
+fn a_command_that_is_held_is_taken_once_and_acknowledged_when_it_is_seen_to_have_happened() {
+    let mut air = Air::joined(1);
+    let mut room = [0; MAX_FRAME];
+    for (number, is_done) in [(7, true), (8, false)] {
+        let numbered = Payload::Numbered { number, command: command(GuidedKind::Arm) };
+        let mut held = None;
+        for turn in 0..5 {
+            air.now += PERIOD;
+            let mut frame = air.station.seal(air.now, &numbered, &mut room).expect("sealed").to_vec();
+            let received = air.vehicle.receive(air.now, &mut frame).expect("taken");
+            assert_eq!(received.is_some(), turn == 0, "once");
+            held = held.or(received.map(|received| air.vehicle.hold(&received)));
+            assert_eq!(air.vehicle.acknowledgement(), None, "nothing is known");
+        }
+        let held = held.expect("a command");
+        assert_eq!((held.counter(), held.is_numbered()), (number, true));
+        air.vehicle.settle(held, is_done);
+        let acknowledged = Payload::Acknowledgement { counter: number, taken: true };
+        assert_eq!(air.vehicle.acknowledgement(), is_done.then_some(acknowledged));
+        // One that was not done is handed out again, to be refused again.
+        air.now += PERIOD;
+        let mut frame = air.station.seal(air.now, &numbered, &mut room).expect("sealed").to_vec();
+        assert_eq!(air.vehicle.receive(air.now, &mut frame).expect("taken").is_some(), !is_done);
+        assert_eq!(air.vehicle.acknowledgement(), is_done.then_some(acknowledged));
+    }
+}

@@ -18,7 +18,7 @@ pub use envelope::{Assembly, BODY, Envelope, PART, TUNNEL, TYPE, fingerprint};
 pub use split::{PAUSE, Part, Split};
 
 use crate::cockpit::Cockpit;
-use crate::deed::{Deed, Waited};
+use crate::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
 use crate::desk::{Answer, Desk, Room};
 use crate::mavlink::{Identity, Mavlink};
 use crate::refusal::Seat;
@@ -37,8 +37,8 @@ const AT_ONCE: usize = 4;
 const WORDS: usize = 64;
 
 /// Most commands whose acknowledgement waits until the vehicle's state shows their effect. Further
-/// ones are acknowledged when the vehicle takes them.
-const WAITS: usize = 4;
+/// ones are refused, but for those that end a flight: they take the place of the oldest.
+const WAITS: usize = 8;
 /// Greatest age of a command, ms. An older one was held up on the line, and is refused.
 const FRESH_MS: i32 = 1_000;
 const LATE: &str = "expired: it came more than a second late, and was not done";
@@ -210,12 +210,18 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         if deed.is_some_and(|deed| deed.refuse(&cockpit.view().state(), &mut words)) {
             return self.say(number, &Payload::Reply { text: &words, last: true }, put);
         }
+        if self.waits.is_full() && deed.is_some_and(|deed| !deed.ends_a_flight()) {
+            return self.say(number, &Payload::Reply { text: TOO_MANY, last: true }, put);
+        }
         let waited = deed.map(|deed| Waited::new(now, deed, cockpit));
         match cockpit.guide(now, seat, command) {
             // Acknowledged when it is seen to have happened.
-            Ok(()) if let Some(waited) = waited.filter(|_| !self.waits.is_full()) => {
-                // There is room.
-                _ = self.waits.push((number, waited));
+            Ok(()) if let Some(waited) = waited => {
+                let Err(new) = self.waits.push((number, waited)) else { return };
+                let oldest = self.waits.iter_mut().min_by_key(|(_, waited)| waited.since());
+                if let Some((overtaken, _)) = oldest.map(|oldest| core::mem::replace(oldest, new)) {
+                    self.say(overtaken, &Payload::Reply { text: OVERTAKEN, last: true }, put);
+                }
             }
             Ok(()) => self.say(number, &Payload::Acknowledgement { counter: number.into(), taken: true }, put),
             Err(refusal) => {

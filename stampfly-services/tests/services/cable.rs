@@ -433,3 +433,34 @@ proptest! {
         prop_assert_eq!(&line.typed[..], b"status\r");
     }
 }
+
+#[test]
+fn commands_that_come_at_once_are_each_answered_as_the_vehicle_does_them_and_too_many_are_refused() {
+    let guided = |kind| Payload::Guided(GuidedCommand { kind, ..GuidedCommand::default() });
+    let mut line = Line::new();
+    // A vehicle that does not arm, and does not say why.
+    line.vehicle.status(|status| status.blocks = ArmBlocks::NONE);
+    (1..=6).for_each(|number| line.ask(&guided(GuidedKind::Arm), number));
+    line.turn();
+    assert_eq!(line.heard(), [], "nothing is known of any");
+    (0..160).for_each(|_| _ = line.turn());
+    let heard = line.heard();
+    let numbers: Vec<u16> = heard.iter().map(|(number, _)| *number).collect();
+    assert_eq!(numbers, [1, 2, 3, 4, 5, 6]);
+    assert!(heard.iter().all(|(_, text)| text.starts_with("Reply")), "{heard:?}");
+
+    // Others of many are refused, and never called done.
+    (1..=20).for_each(|number| line.ask(&guided(GuidedKind::Arm), number));
+    let heard = line.heard();
+    assert_eq!(heard.len(), 12);
+    assert!(heard.iter().all(|(_, text)| text.contains("too many commands at once")), "{heard:?}");
+    // What ends a flight finds room, and the oldest is told so.
+    line.ask(&guided(GuidedKind::Kill), 30);
+    line.turn();
+    let heard = line.heard();
+    assert!(heard[0].0 == 1 && heard[0].1.contains("a later command ends the flight"), "{heard:?}");
+    assert!(heard[1].0 == 30 && heard[1].1.starts_with("Acknowledgement"), "{heard:?}");
+    (0..160).for_each(|_| _ = line.turn());
+    let heard = line.heard();
+    assert!(heard.len() == 7 && heard.iter().all(|(_, text)| text.starts_with("Reply")), "{heard:?}");
+}
