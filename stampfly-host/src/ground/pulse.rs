@@ -10,6 +10,9 @@ use std::time::Duration;
 const SILENCE: Duration = Duration::from_secs(1);
 /// Delayed texts arrive within this time of one another.
 const BURST: Duration = Duration::from_millis(100);
+/// And all of them within this time: they are few. A program that talks without a pause, each time
+/// that it is answered, is not late for ever.
+const LONGEST: Duration = Duration::from_secs(1);
 /// Signs of life in one burst that a page without a delay does not send.
 const SIGNS: u32 = 2;
 
@@ -17,8 +20,8 @@ const SIGNS: u32 = 2;
 #[derive(Debug)]
 pub(super) struct Pulse {
     heard: Duration,
-    /// The beginning of the silence before this burst, and the signs of life in the burst.
-    silent: Option<(Duration, u32)>,
+    /// The beginning of the silence before this burst, that of the burst, and its signs of life.
+    silent: Option<(Duration, Duration, u32)>,
 }
 
 impl Pulse {
@@ -30,11 +33,12 @@ impl Pulse {
     pub fn hear(&mut self, now: Duration, is_alive: bool) -> Duration {
         let gap = now.saturating_sub(self.heard);
         if gap > BURST {
-            self.silent = (gap > SILENCE).then_some((self.heard, 0));
+            self.silent = (gap > SILENCE).then_some((self.heard, now, 0));
         }
+        self.silent.take_if(|(_, begun, _)| now.saturating_sub(*begun) > LONGEST);
         self.heard = now;
         match &mut self.silent {
-            Some((since, signs)) => {
+            Some((since, _, signs)) => {
                 *signs += u32::from(is_alive);
                 if *signs >= SIGNS { *since } else { now }
             }
@@ -60,6 +64,17 @@ mod tests {
             assert_eq!(pulse.hear(at(ms), is_alive), at(1_600));
         }
         assert_eq!(pulse.hear(at(5_100), true), at(5_100), "it is back");
+    }
+
+    #[test]
+    fn a_program_that_says_with_each_question_that_it_is_there_is_late_for_a_second_at_most() {
+        let at = |ms: u64| Duration::from_millis(10_000 + ms);
+        let mut pulse = Pulse::new(at(0));
+        for ms in (5_000..9_000).step_by(10) {
+            pulse.hear(at(ms), true);
+            let asked = pulse.hear(at(ms), false);
+            assert!(asked == at(ms) || ms <= 6_000, "{ms} ms");
+        }
     }
 
     #[test]

@@ -66,6 +66,7 @@ fn are_refused(name: &str, socket: &mut WebSocket<TcpStream>, first: u32, comman
                 last = text.to_owned();
             }
         }
+        std::thread::sleep(Duration::from_millis(if again.is_empty() { 0 } else { 200 }));
         left.retain(|(id, _)| again.iter().any(|again| *again == *id));
         assert!(Instant::now() < until, "{name}: {left:?} are not answered by the vehicle: {last}");
     }
