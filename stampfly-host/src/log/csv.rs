@@ -1,7 +1,8 @@
 //! A table a topic: time stamps in microseconds, then every number, with names as pyulog's `ulog2csv` writes them.
 
 use super::shown;
-use stampfly_lab::flight::Series;
+use stampfly_lab::flight::{Column, Series};
+use stampfly_log::plain;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -49,7 +50,9 @@ impl FileNames {
     }
 }
 
-/// Writes a topic as a table.
+/// Writes a topic as a table. Its header is one line, whatever names the log's fields have: those with
+/// commas or quotes in them are quoted as RFC 4180 says, and control characters are shown as
+/// [`plain`] shows them.
 ///
 /// ```
 /// use stampfly_host::log::csv;
@@ -68,7 +71,8 @@ impl FileNames {
 /// When `out` does not take it.
 pub fn write(series: &Series, out: &mut impl Write) -> io::Result<()> {
     write!(out, "timestamp")?;
-    series.columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+    let mut columns = series.columns.iter().map(Heading::of);
+    columns.try_for_each(|column| write!(out, ",{}", column.name))?;
     writeln!(out)?;
     for (row, at) in series.at.iter().enumerate() {
         write!(out, "{}", at.as_micros())?;
@@ -78,4 +82,19 @@ pub fn write(series: &Series, out: &mut impl Write) -> io::Result<()> {
         writeln!(out)?;
     }
     Ok(())
+}
+
+/// What stands above a column.
+struct Heading {
+    name: String,
+}
+
+impl Heading {
+    /// The column's name, in quotes where it would be more than one name, or would not begin or end
+    /// where it does.
+    fn of(column: &Column) -> Self {
+        let name = plain(&column.name).to_string();
+        let is_bare = !name.contains([',', '"']) && name.trim() == name;
+        Self { name: if is_bare { name } else { format!("\"{}\"", name.replace('"', "\"\"")) } }
+    }
 }

@@ -171,3 +171,19 @@ fn small_files_that_claim_much_cost_little_time_and_memory() {
         assert!(text(&output).contains("no activations") && began.elapsed() < PATIENCE, "{what}: {}", text(&output));
     }
 }
+
+#[test]
+fn names_of_fields_are_one_header_line_of_a_table_whatever_is_in_them() {
+    let folder = folder("files", "fields");
+    let mut bytes = begun(0);
+    format(&mut bytes, "x:uint64_t timestamp;float ../x,\"\n=cmd|calc;float \x1b[2Jclear;float a,b;float y;");
+    subscribe(&mut bytes, 1, 0, "x");
+    let values: Vec<u8> = [1.0_f32, 2.0, 3.0, 4.5].iter().flat_map(|value| value.to_le_bytes()).collect();
+    sample(&mut bytes, 1, 1_000, &values);
+    std::fs::write(folder.join("fields.ulg"), bytes).expect("written");
+    let output = log(&folder, &["csv", "fields.ulg"]);
+    assert!(output.status.success(), "{}", text(&output));
+    let table = std::fs::read_to_string(folder.join("fields_x_0.csv")).expect("a table");
+    let header = r#"timestamp,"../x,""\u000a=cmd|calc",\u001b[2Jclear,"a,b",y"#;
+    assert_eq!(table, format!("{header}\n1000,1,2,3,4.5\n"));
+}
