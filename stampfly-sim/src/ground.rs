@@ -90,7 +90,7 @@ use core::cell::RefCell;
 use core::net::IpAddr;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::parameters;
-use stampfly_services::deed::{Deed, Waited};
+use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::link::mavlink::signing::SigningKey;
 use stampfly_services::mavlink::{Identity, Mavlink};
@@ -107,7 +107,8 @@ pub const TURN: u32 = 4;
 
 /// Clients of MAVLink at once: more than a TCP port takes, so that those that only listen there keep no datagrams out.
 const CLIENTS: usize = 48;
-/// Asks of pages that wait to be seen done. More are answered at once.
+/// Asks of pages that wait to be seen done. More are refused, but for those that end a flight: they
+/// take the place of the oldest.
 const WAITS: usize = 64;
 
 /// What a vehicle is for programs at its ports.
@@ -221,15 +222,24 @@ impl<H: Hands> Ground<H> {
             (PortSpec::PAGE, Heard::Bytes(text)) => {
                 let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
                 let Some(asked) = asked else { return };
-                let answer = self.page(now, page(&from), &asked.ask, samples, console);
-                let waited = match &asked.ask {
-                    Ask::Guided(guided) if answer.is_ok() => Deed::of(GuidedCommand::from(*guided).kind),
+                let deed = match &asked.ask {
+                    Ask::Guided(guided) => Deed::of(GuidedCommand::from(*guided).kind),
                     _ => None,
                 };
+                let is_full = self.waits.len() >= WAITS;
+                if is_full && deed.is_some_and(|deed| !deed.ends_a_flight()) {
+                    return put(&from, asked.answered(Err(TOO_MANY.into())).as_bytes());
+                }
+                // Before the vehicle is asked: its refusals are counted.
+                let waited = deed.map(|deed| Waited::new(now, deed, &self.seated(samples)));
+                let answer = self.page(now, page(&from), &asked.ask, samples, console);
                 match waited {
                     // Answered when it is seen to have happened.
-                    Some(deed) if self.waits.len() < WAITS => {
-                        let waited = Waited::new(now, deed, &self.seated(samples));
+                    Some(waited) if answer.is_ok() => {
+                        if is_full {
+                            let (client, asked, _) = self.waits.remove(0);
+                            put(&client, asked.answered(Err(OVERTAKEN.into())).as_bytes());
+                        }
                         self.waits.push((from, asked, waited));
                     }
                     // What is said again and again needs no answer.
@@ -268,9 +278,12 @@ impl<H: Hands> Ground<H> {
             Heard::Opened => mavlink.open(now, from, true),
             Heard::Bytes(bytes) => {
                 let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
-                match is_local {
-                    true => mavlink.hear_local(now, from, bytes, &mut cockpit, put),
-                    false => mavlink.hear(now, from, bytes, &mut cockpit, put),
+                if is_local {
+                    return mavlink.hear_local(now, from, bytes, &mut cockpit, put);
+                }
+                mavlink.hear(now, from, bytes, &mut cockpit, put);
+                if mavlink.is_believed(from) {
+                    ports.believe(&from);
                 }
             }
             Heard::Late(bytes) => {

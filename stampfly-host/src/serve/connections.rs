@@ -52,6 +52,16 @@ impl fmt::Display for Ended {
 /// Hears of connections that were ended.
 type Told = Box<dyn Fn(Ended) + Send + Sync>;
 
+/// A port that takes connections.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Door {
+    /// Its place among the vehicle's.
+    pub port: usize,
+    pub spec: &'static PortSpec,
+    /// Does only what is signed with the key count there?
+    pub asks_for_key: bool,
+}
+
 /// The queue of every connection.
 #[derive(Default)]
 pub(super) struct Connections {
@@ -66,7 +76,8 @@ pub(super) struct Connections {
 #[derive(Debug)]
 struct Queue {
     bytes: Outbox,
-    /// The how many-th it is, and whether it has shown that it speaks the port's language.
+    /// The how many-th it is, and whether it has shown that it speaks the port's language; where the
+    /// key is asked for, that it has the key.
     number: u64,
     is_shown: bool,
     /// Is what finds no room lost? A serial line stays, whether or not a program reads there.
@@ -113,19 +124,19 @@ impl Connections {
     }
 
     /// Takes connections until the ports are closed.
-    pub fn accept(self: &Arc<Self>, port: usize, spec: &'static PortSpec, listener: &TcpListener, events: &Events) {
+    pub fn accept(self: &Arc<Self>, door: Door, listener: &TcpListener, events: &Events) {
         if listener.set_nonblocking(true).is_err() {
             return;
         }
         while events.are_open() {
             match listener.accept() {
-                Ok((stream, address)) => self.begin(Client { port, address }, spec, stream, events),
+                Ok((stream, address)) => self.begin(Client { port: door.port, address }, door, stream, events),
                 Err(_) => std::thread::sleep(POLL / 5),
             }
         }
     }
 
-    fn begin(self: &Arc<Self>, client: Client, spec: &'static PortSpec, stream: TcpStream, events: &Events) {
+    fn begin(self: &Arc<Self>, client: Client, door: Door, stream: TcpStream, events: &Events) {
         let (queue, waiting) = Outbox::new(WAITING);
         let mut all = self.queues();
         let prepared = stream
@@ -143,8 +154,8 @@ impl Connections {
         std::thread::spawn(move || write(writer, &waiting));
         std::thread::spawn(move || {
             events.put(client, Heard::Opened, Instant::now());
-            if let Err(speaks) = read(stream, client, spec, &connections, &events) {
-                connections.end(spec.name, speaks);
+            if let Err(speaks) = read(stream, client, door, &connections, &events) {
+                connections.end(door.spec.name, speaks);
             }
             connections.queues().remove(&client);
             events.put(client, Heard::Closed, Instant::now());
@@ -156,8 +167,8 @@ impl Connections {
         self.queues().keys().copied().collect()
     }
 
-    /// This one speaks the language of its port.
-    fn show(&self, client: &Client) {
+    /// This one speaks the language of its port, and has its key where that is asked for.
+    pub fn show(&self, client: &Client) {
         if let Some(queue) = self.queues().get_mut(client) {
             queue.is_shown = true;
         }
@@ -169,7 +180,8 @@ impl Connections {
 }
 
 /// Is there room for another connection to this port? Of too many, the oldest that has shown
-/// nothing makes room: who only listens may, but keeps no program out.
+/// nothing makes room: who only listens may, but keeps no program out. Where the key is asked for,
+/// so does who speaks without it.
 fn has_room(all: &mut HashMap<Client, Queue>, port: usize) -> bool {
     let at_port = all.iter().filter(|(client, _)| client.port == port);
     if at_port.clone().count() < MOST {
@@ -187,12 +199,13 @@ fn has_room(all: &mut HashMap<Client, Queue>, port: usize) -> bool {
 fn read(
     mut stream: TcpStream,
     client: Client,
-    spec: &PortSpec,
+    door: Door,
     connections: &Connections,
     events: &Events,
 ) -> Result<(), Foreign> {
-    let (mut part, mut greeting) = ([0; PART], Greeting::new(spec.speech));
-    let (mut heard, mut is_shown) = (Ok(()), false);
+    let (mut part, mut greeting) = ([0; PART], Greeting::new(door.spec.speech));
+    // Where the key is asked for, the vehicle tells who has it.
+    let (mut heard, mut is_shown) = (Ok(()), door.asks_for_key);
     let (mut looks, mut patience) = (Looks::begin(Instant::now()), POLL);
     while heard.is_ok() && events.are_open() && connections.has(&client) {
         if patience != looks.patience() && stream.set_read_timeout(Some(looks.patience())).is_ok() {

@@ -5,7 +5,7 @@
 //! waited for it for more than a second, it is told to be late.
 
 use super::age::Looks;
-use super::connections::{Connections, Ended};
+use super::connections::{Connections, Door, Ended};
 use super::events::{self, Event, Events, POLL, Waiting};
 use super::key::Key;
 use super::option::PortOption;
@@ -197,6 +197,12 @@ impl OpenPorts {
         !has_room && self.key.as_ref().is_some_and(Key::is_everywhere)
     }
 
+    /// Does what is said at this port count only when it is signed with the key?
+    fn asks_for_key(&self, spec: &PortSpec, address: SocketAddr) -> bool {
+        let is_asked = |key: &Key| key.is_everywhere() || !address.ip().is_loopback();
+        spec.guard == Guard::Key && self.key.as_ref().is_some_and(is_asked)
+    }
+
     /// Opens this one. Returns its socket, if it is one of datagrams.
     fn open_one(
         &mut self,
@@ -216,7 +222,8 @@ impl OpenPorts {
             Transport::Tcp => {
                 let listener = TcpListener::bind(address)?;
                 self.places.push((spec, listener.local_addr()?));
-                std::thread::spawn(move || connections.accept(port, spec, &listener, &events));
+                let door = Door { port, spec, asks_for_key: self.asks_for_key(spec, address) };
+                std::thread::spawn(move || connections.accept(door, &listener, &events));
                 return Ok(None);
             }
             Transport::Terminal => {
@@ -363,6 +370,10 @@ impl Ports for OpenPorts {
         } else {
             self.connections.send(to, bytes);
         }
+    }
+
+    fn believe(&self, client: &Client) {
+        self.connections.show(client);
     }
 
     fn tell(&self, text: &str) {
