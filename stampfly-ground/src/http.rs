@@ -339,6 +339,25 @@ mod tests {
     }
 
     #[test]
+    fn other_spellings_of_this_server_and_two_origins_are_refused() {
+        let from = |host: &str, origins: &[&str]| {
+            let origins: String = origins.iter().map(|origin| format!("Origin: {origin}\r\n")).collect();
+            get("/", &format!("Host: {host}\r\n{origins}"), Hosts::Loopback)
+        };
+        // With a dot behind it, a browser asks for another cookie jar and another permission.
+        for host in ["localhost.:8000", "127.0.0.1.:8000", "[::ffff:127.0.0.1]:8000", "0.0.0.0:8000"] {
+            let own = format!("http://{host}");
+            assert_eq!(from(host, &[&own]), Err(Refusal::ForeignHost), "{host}");
+            assert_eq!(from(host, &[]), Err(Refusal::ForeignHost), "{host}");
+            assert_eq!(from("localhost:8000", &[&own]), Err(Refusal::ForeignOrigin), "{host}");
+        }
+        let own = "http://localhost:8000";
+        for origins in [[own, "http://evil.example"], ["http://evil.example", own], [own, own]] {
+            assert_eq!(from("localhost:8000", &origins), Err(Refusal::ForeignOrigin), "{origins:?}");
+        }
+    }
+
+    #[test]
     fn only_the_page_itself_is_shown_to_who_comes_from_another_site() {
         for (site, path, wanted) in [
             ("cross-site", "/", Ok(Wanted::Page)),
