@@ -4,8 +4,9 @@ use crate::common::{Id, Vehicle};
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_link::mavlink::signing::{Signer, SigningKey};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
+use stampfly_link::secure::Key;
 use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};
-use stampfly_services::{Request, Seat};
+use stampfly_services::{Asked, Request, Seat, Told};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, CalibrationKind, CalibrationReport, CalibrationStage, GuidedKind, SystemAlert,
 };
@@ -491,6 +492,60 @@ fn what_the_vehicle_has_said_itself_does_not_come_back() {
         assert!(!mavlink.is_believed(1) && !mavlink.is_believed(2), "{ms} ms");
     }
     assert_eq!(vehicle.alive, []);
+}
+
+#[test]
+fn only_the_key_that_is_derived_for_signing_signs() {
+    let key = Key::generate(1, core::array::from_fn(|place| place as u8 ^ 0x5A)).expect("random enough");
+    let (mut mavlink, mut vehicle) =
+        (Mavlink::new(IDENTITY).with_key(SigningKey::of(&key), 1_000), Vehicle::standing());
+    let raw = SigningKey::new(*key.bytes());
+    // What a page's address ends with, as bytes, and as the digits that people see.
+    let page = key.purpose(b"stampfly-webpage");
+    let digits: String = page.iter().map(|byte| format!("{byte:02x}")).collect();
+    let typed: String = key.bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+    let purpose = SigningKey::new(*key.phrase().as_str().as_bytes().first_chunk().expect("64 digits"));
+    let others = [
+        raw,
+        SigningKey::new(page),
+        SigningKey::from_passphrase(&digits),
+        SigningKey::from_passphrase(&typed),
+        purpose,
+    ];
+    let all = others.into_iter().map(|key| (key, false)).chain([(SigningKey::of(&key), true)]);
+    for (client, (signing, is_believed)) in (1..).zip(all) {
+        let (mut room, mut signer) = ([0; LONGEST], Signer::new(signing, 0, 2_000));
+        let frame = MavlinkWriter::new(255, 190).write_signed(Instant::ZERO, &arm(), &mut signer, &mut room);
+        mavlink.hear(Instant::ZERO, client, frame.expect("there is room"), &mut vehicle, &mut |_, _| {});
+        assert_eq!(mavlink.is_believed(client), is_believed, "{client}");
+        assert_eq!(vehicle.guided.len(), usize::from(is_believed), "{client}");
+    }
+}
+
+#[test]
+fn every_station_is_told_what_was_done_and_by_whom_once() {
+    let (mut mavlink, mut vehicle) = (Mavlink::new(IDENTITY), Vehicle::standing());
+    for client in [1, 2] {
+        mavlink.open(Instant::ZERO, client, true);
+    }
+    let mut texts = |vehicle: &mut Vehicle, from| {
+        let sent = polled(&mut mavlink, vehicle, from, from + 200);
+        let texts = sent.into_iter().filter_map(|(to, message)| match message {
+            MavMessage::STATUSTEXT(text) => Some((to, text.text.to_str().expect("text").to_owned())),
+            _ => None,
+        });
+        texts.collect::<Vec<_>>()
+    };
+    assert_eq!(texts(&mut vehicle, 0), []);
+    let done = [(Seat::Page(3), GuidedKind::Arm), (Seat::Link(2), GuidedKind::Kill)];
+    vehicle.told.extend(done.map(|(seat, kind)| Told { seat, what: Asked::Command(kind) }));
+    let wanted = ["page 3: arm", "the station with the key, line 2: KILL"];
+    let mut heard = texts(&mut vehicle, 200);
+    heard.sort_by_key(|(to, _)| *to);
+    assert_eq!(heard, [1, 2].map(|to| wanted.map(|text| (to, text.to_owned()))).concat());
+    assert_eq!(texts(&mut vehicle, 400), [], "once");
+    vehicle.told.push(Told { seat: Seat::Page(3), what: Asked::Left });
+    assert_eq!(texts(&mut vehicle, 600).len(), 2);
 }
 
 #[test]
