@@ -3,6 +3,7 @@
 
 mod aeroplane;
 mod agreement;
+mod asked_at_once;
 mod chips;
 mod compensation;
 mod conditions;
