@@ -216,6 +216,10 @@ impl<'b> Link<'b> {
             self.refused = Some(Refused::new(counter, why, 1));
             return;
         }
+        // Who commands is told before what the vehicle would say.
+        if let Some(holder) = helm.holder(at).filter(|holder| *holder != seat && !deed.ends_a_flight()) {
+            return self.deny(counter, is_numbered, &Refusal::Occupied(holder));
+        }
         let mut words = String::<TEXT>::new();
         if deed.refuse(&self.status(), &mut words) {
             return self.deny(counter, is_numbered, &words);
