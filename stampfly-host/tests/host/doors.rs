@@ -127,14 +127,14 @@ fn with_sign_all_nothing_unsigned_commands() {
     // The page's socket wants the secret.
     let socket = |end: &str| {
         let stream = TcpStream::connect(address).expect("it listens");
-        tungstenite::client(format!("ws://{address}/ws{end}"), stream)
+        tungstenite::client(format!("ws://{address}/ws{end}"), stream).map_err(Box::new)
     };
     for end in ["", "?secret=0", &format!("?secret={}", "0".repeat(secret.len()))] {
-        let error = match socket(end) {
-            Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) => answer.status().as_u16(),
-            other => panic!("{end}: {}", other.is_ok()),
+        let error = *socket(end).expect_err("no secret");
+        let tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer)) = error else {
+            panic!("{end}: {error}");
         };
-        assert_eq!(error, 403, "{end}");
+        assert_eq!(answer.status().as_u16(), 403, "{end}");
     }
     let (near, answer) = socket(&format!("?secret={secret}")).expect("a handshake");
     assert_eq!(answer.status().as_u16(), 101);
