@@ -7,8 +7,8 @@
 //! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, in four that follow from each other when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, in four that follow from each other when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
-//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
-//! | `MOTOR_LOST` | in the air, a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
+//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch, as far as the motors can make it, that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
+//! | `MOTOR_LOST` | in the air, such a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
 //! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 20 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
@@ -88,7 +88,7 @@ use stampfly_types::{Instant, Stamped};
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
 ///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
-///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), thrust: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
+///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), unmet: [0.0; 4], thrust: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
@@ -229,7 +229,7 @@ impl Failsafe {
         let mut implausible = false;
         if !suspect {
             self.attitude.add(&self.config, imu);
-            let follows = self.follows.step(&self.config, *at, imu, input.output);
+            let follows = self.follows.step(&self.config, *at, imu, input.torque());
             let unknown = Alerts::MOTOR_WEAK | Alerts::POWER_LOST | Alerts::POWER_IMPLAUSIBLE;
             let known = !self.active.intersects(unknown);
             let [unexplained, lasts] = self.force.step(&self.config, *at, imu, input, known);

@@ -55,6 +55,7 @@ pub fn failsafe_stream(data: &[u8]) {
                 flow: None,
                 baro: None,
                 output: &ControlOutput::default(),
+                unmet: [0.0; 4],
                 thrust: None,
                 self_test: SelfTestVerdict::NotRun,
                 flight_status: &flight_status,

@@ -70,6 +70,7 @@ impl Runnable for Failsafe {
                 flow: usable(&ends.sensor_flow, |flow| flow.valid || stands),
                 baro: usable(&ends.sensor_baro, |pressure| pressure.altitude.is_finite()),
                 output: ends.control_output.get(),
+                unmet: ends.actuator_motor.get().unmet,
                 thrust,
                 self_test: ends.self_test.get().verdict,
                 flight_status: ends.flight_status.get(),

@@ -116,8 +116,10 @@ impl AttitudeMonitor {
                 };
                 // From a slope it turns to level, and stands as the slope does.
                 let ((lean, leans), (_, tilts)) = (soon(&self.rest), soon(&Vec3::z()));
-                // A pilot may want to tilt, and a program may land in a gust. Then the controller does not push back. Against a
-                // weak motor it pushes all the time, and on the ground that is what tips the vehicle.
+                // A pilot may want to tilt, and a program may land in a gust. Then the controller
+                // does not push back. Against a weak motor it pushes all the time, and on the
+                // ground that is what tips the vehicle. It is about what the controller wants, so
+                // what is unmet counts.
                 let share = if *phase == FlightPhase::Flying { BY_HAND } else { 1.0 };
                 let [roll, pitch] = [config.weak_roll, config.weak_pitch].map(|limit| limit * share);
                 let pushes_back = torque.x * lean.y.signum() < -roll || torque.y * lean.x.signum() > pitch;

@@ -1,19 +1,20 @@
 //! Do the measured rates follow the commanded torques?
 //!
 //! Torque over inertia, through the lag of the motors, is the angular acceleration that the
-//! controller makes. What it adds to the rate within [`CHANGE`] is compared with what the gyro
-//! says, both less their mean over [`MEAN`], since a load that lies askew asks for torque all the
-//! time. The share of the one in the other, by least squares over [`OVER`], is one; inertia and
-//! thrust of a specimen make 0.6 to 1.4 of it. Where it is less than a third, the rates are not
-//! those of the body, or the body does not answer to its motors, and nothing keeps it level.
+//! controller makes. The torque is what the motors were told to make: what was unmet turns nothing.
+//! What it adds to the rate within [`CHANGE`] is compared with what the gyro says, both less their
+//! mean over [`MEAN`], since a load that lies askew asks for torque all the time. The share of the
+//! one in the other, by least squares over [`OVER`], is one; inertia and thrust of a specimen make
+//! 0.6 to 1.4 of it. Where it is less than a third, the rates are not those of the body, or the
+//! body does not answer to its motors, and nothing keeps it level.
 //!
 //! It is asked only where the torque makes more than noise and vibration do. Not for a judgement of
 //! its own: torque that holds off a gust, or pushes against a hand or the ground, makes no rate
 //! either.
 
 use super::config::FailsafeConfig;
-use stampfly_types::messages::{ControlOutput, ImuData};
-use stampfly_types::{Instant, math};
+use stampfly_types::messages::ImuData;
+use stampfly_types::{Instant, Vec3, math};
 
 /// Time constants of changes, of their mean, and of the sums, s.
 const CHANGE: f32 = 0.1;
@@ -52,10 +53,11 @@ struct Axis {
 }
 
 impl FollowsMonitor {
-    /// Takes a sample beside what was asked for. Do the rates follow?
-    pub(super) fn step(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, asked: &ControlOutput) -> bool {
+    /// Takes a sample beside the torque that the motors were told to make, N·m. Do the rates
+    /// follow?
+    pub(super) fn step(&mut self, config: &FailsafeConfig, at: Instant, imu: &ImuData, torque: Vec3) -> bool {
         let dt = self.last.replace(at).map_or(0.0, |last| math::smaller(at.since(last).seconds(), LONGEST_STEP));
-        let (torque, inertia) = (asked.torque.to_array(), config.inertia.to_array());
+        let (torque, inertia) = (torque.to_array(), config.inertia.to_array());
         let lag = dt / (config.motor_lag + dt);
         let (kept, mean) = (CHANGE / (CHANGE + dt), dt / (MEAN + dt));
         let [mut square, mut product] = [0.0; 2];

@@ -1,9 +1,10 @@
 //! What the failsafe looks at in one step. Everything is borrowed.
 
+use stampfly_types::math::smaller;
 use stampfly_types::messages::{
     ControlOutput, EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate,
 };
-use stampfly_types::{Instant, Stamped};
+use stampfly_types::{Instant, Stamped, Vec3};
 
 /// What the failsafe looks at.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +27,9 @@ pub struct FailsafeInput<'a> {
     pub baro: Option<Instant>,
     /// What the controller asked for one step ago.
     pub output: &'a ControlOutput,
+    /// What the motors could not make of that: shares of roll, pitch, yaw and thrust, 0 is none
+    /// ([`MotorOutput::unmet`](stampfly_types::messages::MotorOutput)).
+    pub unmet: [f32; 4],
     /// What the motors push with together, as their duties and the battery's voltage make it, N;
     /// `None` where that is not known.
     pub thrust: Option<f32>,
@@ -33,4 +37,15 @@ pub struct FailsafeInput<'a> {
     pub self_test: SelfTestVerdict,
     /// State and mode one step ago.
     pub flight_status: &'a FlightStatus,
+}
+
+impl FailsafeInput<'_> {
+    /// Torque that the motors were told to make, body axes, N·m: what was asked for, less what was
+    /// unmet. A number that is no share counts as none.
+    pub(super) fn torque(&self) -> Vec3 {
+        let [roll, pitch, yaw, _] = self.unmet;
+        let met = |unmet: f32| if unmet > 0.0 { 1.0 - smaller(unmet, 1.0) } else { 1.0 };
+        let asked = self.output.torque;
+        Vec3::new(asked.x * met(roll), asked.y * met(pitch), asked.z * met(yaw))
+    }
 }

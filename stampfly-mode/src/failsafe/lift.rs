@@ -39,6 +39,7 @@ impl LiftMonitor {
             self.short = None;
             return false;
         }
+        // All that is asked for, with what is unmet: a battery that does not give it is a reason.
         let asked = input.output.thrust / config.hover_thrust;
         let carries = self.force / GRAVITY;
         let stays = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;

@@ -2,11 +2,12 @@
 //!
 //! Its thrust is missed on one corner, so the controller asks for torque about roll and pitch at
 //! once, and keeps asking. A gust or a manoeuvre asks for as much for a moment, a shifted load
-//! about one axis. A battery that lies askew asks for it from the take-off on: so what has become
-//! so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a rotor's share of the weight on, what has
-//! been so from [`STANDING`] times that on. Half a propeller that was broken before looks like a
-//! battery that lies askew, and is trimmed as one. A vehicle on the ground says nothing, because
-//! what holds it looks the same.
+//! about one axis. What the motors cannot make of the demand does not count: on a tired battery a
+//! controller asks for it whatever its rotors are like. A battery that lies askew asks for it from
+//! the take-off on: so what has become so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a
+//! rotor's share of the weight on, what has been so from [`STANDING`] times that on. Half a
+//! propeller that was broken before looks like a battery that lies askew, and is trimmed as one. A
+//! vehicle on the ground says nothing, because what holds it looks the same.
 //!
 //! With half of a rotor's thrust a vehicle lands. A controller that asks for more than one rotor's whole share about both axes
 //! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost. It shows at
@@ -32,7 +33,7 @@ const LOST: f32 = 1.0 / WEAK_SHARE;
 /// A lost motor asks for that this soon after the torque has become uneven. One that asks later is weak, and lands: it is not dropped.
 const SOON: Duration = Duration::from_millis(160);
 
-/// What is remembered of the torque that the controller asks for.
+/// What is remembered of the torque that the motors are told to make.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MotorMonitor {
@@ -60,11 +61,12 @@ impl MotorMonitor {
         // knowing it looks the same.
         let above = if known_weak { config.lift_height } else { config.touch_height };
         let lands = phase == FlightPhase::Landing && height.is_some_and(|height| height > above);
-        let asked = [input.output.torque.x, input.output.torque.y];
+        let made = input.torque();
+        let made = [made.x, made.y];
         let limits = [config.weak_roll, config.weak_pitch];
         let (mut became, mut stands, mut exceeds) = (true, true, true);
         for axis in 0..2 {
-            self.mean[axis] += (asked[axis] - self.mean[axis]) * WEIGHT;
+            self.mean[axis] += (made[axis] - self.mean[axis]) * WEIGHT;
             let risen = self.mean[axis] - self.usual[axis];
             self.usual[axis] += risen * USUAL;
             became &= risen.abs() > limits[axis];

@@ -101,6 +101,7 @@ impl Runnable for Failsafe {
                 flow: Some(now),
                 baro: Some(now),
                 output: &ControlOutput::default(),
+                unmet: [0.0; 4],
                 thrust: None,
                 self_test: SelfTestVerdict::NotRun,
                 flight_status: ends.flight_status.get(),

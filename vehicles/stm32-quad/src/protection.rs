@@ -167,6 +167,7 @@ impl Protection {
                 flow: Some(now),
                 baro: Some(now),
                 output: &ControlOutput::default(),
+                unmet: [0.0; 4],
                 thrust: None,
                 self_test: SelfTestVerdict::NotRun,
                 flight_status: &family::status(state, attitude, turning, Alerts::NONE),

@@ -86,6 +86,7 @@ fn failsafe_goes_on() {
             flow: None,
             baro: None,
             output: &ControlOutput::default(),
+            unmet: [0.0; 4],
             thrust: None,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &FlightStatus { phase, armed, ..Default::default() },

@@ -18,9 +18,13 @@ fn follow(asked: f32, constant: f32, body: f32, scale: f32, disturbed: fn(f32) -
         let torque = asked * stampfly_types::math::sin(12.0 * time) + constant;
         lagged += (torque - lagged) * (DT / (0.02 + DT));
         rate += (body * (lagged - constant) + disturbed(time)) * DT;
-        let output = ControlOutput { thrust: 0.3, torque: Vec3::new(0.0, torque * INERTIA, 0.0) };
         let imu = ImuData { gyro: Vec3::new(0.0, scale * rate, 0.0) + rig.noise(0.1), ..Default::default() };
-        let follows = monitor.step(&config, Instant::from_micros(2_500 * u64::from(n)), &imu, &output);
+        let follows = monitor.step(
+            &config,
+            Instant::from_micros(2_500 * u64::from(n)),
+            &imu,
+            Vec3::new(0.0, torque * INERTIA, 0.0),
+        );
         follows || n < 800
     })
 }
@@ -57,9 +61,8 @@ fn of_an_unknown_airframe_every_rate_follows() {
     let config = FailsafeConfig::default();
     let follows = (0..400u16).all(|n| {
         let rate = if n % 80 < 40 { 30.0 } else { -30.0 };
-        let output = ControlOutput { thrust: 0.3, torque: Vec3::repeat(-rate) };
         let imu = ImuData { gyro: Vec3::repeat(rate), ..Default::default() };
-        monitor.step(&config, Instant::from_micros(2_500 * u64::from(n)), &imu, &output)
+        monitor.step(&config, Instant::from_micros(2_500 * u64::from(n)), &imu, Vec3::repeat(-rate))
     });
     assert!(follows);
 }

@@ -127,9 +127,10 @@ fn thrust_that_comes_late_is_not_missed() {
 }
 
 /// Torques to and fro, of which the gyro tells so much; after how many of 800 samples of this force
-/// do the motors stop?
-fn cut(force: f32, follows: f32) -> Option<u32> {
+/// do the motors stop? `unmet`: the share of the torque that the motors did not make.
+fn cut(force: f32, follows: f32, unmet: f32) -> Option<u32> {
     let mut rig = hovering(airframe());
+    rig.unmet[0] = unmet;
     let mut rate = 0.0;
     (0..800u32).find(|n| {
         let asked = 60.0 * stampfly_types::math::sin(12.0 * 0.0025 * *n as f32);
@@ -141,10 +142,12 @@ fn cut(force: f32, follows: f32) -> Option<u32> {
 
 #[test]
 fn a_force_without_a_reason_stops_the_motors_at_once_where_rates_do_not_follow() {
-    let samples = cut(0.3, 0.1);
+    let samples = cut(0.3, 0.1, 0.0);
     assert!(samples.is_some_and(|samples| samples < 320), "{samples:?}");
-    assert_eq!(cut(0.3, 1.0), None, "it still answers to its motors");
-    assert_eq!(cut(1.0, 0.1), None, "a hand holds it");
+    assert_eq!(cut(0.3, 1.0, 0.0), None, "it still answers to its motors");
+    assert_eq!(cut(1.0, 0.1, 0.0), None, "a hand holds it");
+    assert_eq!(cut(0.3, 0.0, 1.0), None, "motors at their limit made no torque to follow");
+    assert_eq!(cut(0.3, 0.1, 0.9), None, "the rates follow what they made");
 }
 
 #[test]

@@ -41,6 +41,21 @@ fn a_torque_that_no_three_rotors_make_is_a_lost_motor() {
     }
 }
 
+/// Motors at their limit: what the controller asks for and does not get says nothing of a rotor.
+#[test]
+fn a_torque_that_was_not_made_is_neither_a_weak_motor_nor_a_lost_one() {
+    let seen = |unmet: f32| {
+        let mut rig = rig(FlightPhase::Flying, 1.0);
+        rig.unmet = [unmet, unmet, 0.0, 0.0];
+        [Alerts::MOTOR_WEAK, Alerts::MOTOR_LOST].map(|alert| found(&mut rig, [4.0, -4.0], 400, alert).is_some())
+    };
+    assert_eq!(seen(0.0), [true, true]);
+    assert_eq!(seen(0.5), [true, false], "twice a weak motor's torque was made");
+    assert_eq!(seen(0.8), [false, false], "0.8 of it");
+    assert_eq!(seen(1.0), [false, false], "none");
+    assert_eq!([seen(f32::NAN), seen(-1.0)], [[true, true]; 2], "no share");
+}
+
 #[test]
 fn a_weak_motor_is_lost_soon_or_not_at_all() {
     let lost = |waits: u32, height: f32| {

@@ -60,6 +60,7 @@ impl Rig {
             flow: Some(self.now),
             baro: Some(self.now),
             output: &ControlOutput::default(),
+            unmet: [0.0; 4],
             thrust: None,
             self_test: SelfTestVerdict::NotRun,
             flight_status: &status,
