@@ -70,7 +70,7 @@ stampfly_bus::topics! {
     /// Thrust and torque.
     control_output: ControlOutput = latest @ 400 Hz from control => [failsafe, landing, actuation];
     /// Duty of every motor.
-    actuator_motor: MotorOutput = latest @ 400 Hz from actuation => [failsafe, control, motors];
+    actuator_motor: MotorOutput = latest @ 400 Hz from actuation => [failsafe, landing, control, motors];
 
     // People.
     /// Lights and sound.

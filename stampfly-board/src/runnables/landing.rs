@@ -29,6 +29,7 @@ impl Runnable for Landing {
             phase: ends.flight_status.get().phase,
             setpoint: ends.setpoint.get(),
             demand: ends.control_output.get(),
+            unmet: ends.actuator_motor.get().unmet[3],
         };
         let land_detected = self.manager.step(activation.now(), &input);
         ends.land_detected.publish(activation.now(), &land_detected);

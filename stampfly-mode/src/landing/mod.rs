@@ -1,7 +1,8 @@
 //! Take-off and landing: contact with the ground, when take-off is done, when touchdown is sure.
 //!
-//! Everything here reads the estimate and the thrust that was asked for, never a sensor: a range finder that hangs
-//! must not stop a landing.
+//! Everything here reads the estimate and the thrust that the motors were told to make, never a
+//! sensor: a range finder that hangs must not stop a landing. Thrust that was asked for and not
+//! made carries nothing, and a tired battery's demand is no thrust to compare with.
 //!
 //! It is built of [modes with stages](crate::stage), which follow the flight phase that the [machine](crate::machine) decides:
 //!
@@ -45,6 +46,17 @@ pub struct LandingInput<'a> {
     pub setpoint: &'a Setpoint,
     /// The controller's demand one step ago.
     pub demand: &'a ControlOutput,
+    /// Share of its thrust that the motors could not make, 0 is none
+    /// ([`MotorOutput::unmet`](stampfly_types::messages::MotorOutput)).
+    pub unmet: f32,
+}
+
+impl LandingInput<'_> {
+    /// Thrust that the motors were told to make, N. A number that is no share counts as none.
+    fn thrust(&self) -> f32 {
+        let unmet = if self.unmet.abs() <= 1.0 { self.unmet } else { 0.0 };
+        self.demand.thrust * (1.0 - unmet)
+    }
 }
 
 /// The take-off and landing manager.
@@ -62,6 +74,7 @@ pub struct LandingInput<'a> {
 ///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
 ///         estimate: &estimate, phase: FlightPhase::Landing, setpoint: &Setpoint::default(),
 ///         demand: &ControlOutput { thrust: 4.9 * ceiling.min(1.0), ..Default::default() },
+///         unmet: 0.0,
 ///     });
 ///     ceiling = land_detected.thrust_ceiling;
 ///     if land_detected.landed && landed_at.is_none() { landed_at = Some(k as f32 * 0.0025) }
@@ -108,7 +121,7 @@ impl TakeoffLanding {
             }
         }
         let estimate = input.estimate;
-        let weight = self.weight.step(now, -estimate.specific_force.z, input.demand.thrust, self.is_testing);
+        let weight = self.weight.step(now, -estimate.specific_force.z, input.thrust(), self.is_testing);
         let seen = Seen {
             config: &self.config,
             phase: input.phase,

@@ -117,8 +117,8 @@ impl WeightTest {
         self.flight = self.steady;
     }
 
-    /// Takes one step's specific force upwards, m/s², and demanded thrust, N. `testing`: thrust is being taken away, the
-    /// reference stays.
+    /// Takes one step's specific force upwards, m/s², and thrust that the motors were told to make,
+    /// N. `testing`: thrust is being taken away, the reference stays.
     pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
         let unknown = Answers {
             quick: Support::Unknown,
