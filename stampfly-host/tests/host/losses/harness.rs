@@ -18,8 +18,8 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
 use stampfly_sim::{Simulation, SimulationConfig, Truth, World};
 use stampfly_types::messages::{
-    Alerts, BaroData, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, FlowData, GuidedCommand, GuidedKind,
-    ImuData, MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
+    Alerts, BaroData, ControlOutput, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, FlowData, GuidedCommand,
+    GuidedKind, ImuData, MagData, MotorOutput, PilotInput, PowerData, StateEstimate, SystemAlert, TofData,
 };
 use stampfly_types::{Duration, Instant, Vec3};
 use std::cell::Cell;
@@ -77,6 +77,12 @@ impl Hands<'_> {
         let position = Vec3::new(0.0, 0.0, -height);
         self.guided.publish(now, GuidedCommand { kind, position, ..Default::default() }).expect("room in the queue");
         now
+    }
+
+    /// Appends a way-point, world NED, m.
+    pub fn way_point(&mut self, position: Vec3) {
+        let command = GuidedCommand { kind: GuidedKind::WayPoint, position, ..Default::default() };
+        self.guided.publish(self.clock.now(), command).expect("room in the queue");
     }
 
     /// A frame from the pilot's transmitter; returns the instant.
@@ -163,6 +169,7 @@ pub fn instant() -> (Rc<Cell<Instant>>, Rc<Cell<Instant>>) {
 pub struct Seen {
     pub modes: Vec<(Instant, FlightStatus)>,
     pub alerts: Vec<(Instant, Alerts)>,
+    pub demands: Vec<(Instant, ControlOutput)>,
     pub motors: Vec<(Instant, MotorOutput)>,
     pub truths: Vec<(Instant, Truth)>,
     pub estimates: Vec<(Instant, StateEstimate)>,
@@ -322,6 +329,7 @@ impl vehicle::Around for Watch<'_> {
             Id::system_alert => self.seen.alerts.push((at, message::<SystemAlert>(words).expect(what).active)),
             Id::estimate_state => self.seen.estimates.push((at, message(words).expect(what))),
             Id::estimate_status => self.seen.estimator.push((at, message(words).expect(what))),
+            Id::control_output => self.seen.demands.push((at, message(words).expect(what))),
             Id::actuator_motor => self.seen.motors.push((at, message(words).expect(what))),
             _ => {}
         }

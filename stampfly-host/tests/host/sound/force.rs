@@ -1,7 +1,7 @@
 //! A specific force that differs from the thrust that was asked for.
 
 use super::*;
-use crate::losses::harness::{Lies, climb, run_in, send};
+use crate::losses::harness::{Lies, run_in};
 use stampfly_sim::SimulationConfig;
 use std::pin::Pin;
 
@@ -130,47 +130,7 @@ fn gusts() {
     none(&wrong);
 }
 
-/// Hovers at 1.6 m until its battery makes it land: the resistance, Ω, and the charge of the
-/// battery.
-#[test]
-fn tired_batteries() {
-    let mut wrong = Vec::new();
-    let batteries = [(0.06, 0.2), (0.09, 0.3), (0.12, 0.3), (0.12, 0.5), (0.2, 0.8), (0.2, 1.0)];
-    for seed in seeds() {
-        for (resistance, charge) in batteries {
-            let tired = |simulation: &mut SimulationConfig| {
-                simulation.plant.battery_resistance = resistance;
-                simulation.plant.battery_charge = charge;
-                simulation.wind.gust = 1.0;
-            };
-            let seen = run_in(tired, Lies::default(), seed, 240.0, |mut hands| {
-                Box::pin(async move {
-                    climb(&mut hands, 2.2).await;
-                    while hands.telemetry().phase == FlightPhase::Flying {
-                        send(&mut hands, 0.1, PilotInput { arm: true, ..STICKS }).await;
-                    }
-                    while hands.telemetry().armed {
-                        send(&mut hands, 0.1, PilotInput { arm: true, ..STICKS }).await;
-                    }
-                    hands.leave();
-                    hands.sleep(0.1).await;
-                })
-            });
-            let until = seen.touches_after(1.0);
-            let accused = seen.accused(CONVICTS, until).map(|(all, height)| (names(all), height));
-            let speed = seen.touch_speed();
-            let flown =
-                format!("{resistance} ohm, charge {charge}, seed {seed}: touches at {speed:.2} m/s, {accused:?}");
-            println!("{flown}");
-            if accused.is_some() {
-                wrong.push(flown);
-            }
-        }
-    }
-    none(&wrong);
-}
-
-/// The same battery by hand, with its throttle at both ends.
+/// A tired battery by hand, with its throttle at both ends: its resistance, Ω, and its charge.
 #[test]
 fn tired_batteries_by_hand() {
     let mut wrong = Vec::new();

@@ -2,7 +2,9 @@
 //!
 //! | file | what is usual |
 //! |---|---|
-//! | `force.rs` | throttle at its ends, flips by hand, tired batteries, gusts |
+//! | `force.rs` | throttle at its ends, flips by hand, tired batteries by hand, gusts |
+//! | `packs.rs` | batteries of every resistance and charge, in missions, hovers to the end, climbs |
+//! | `thrust.rs` | all the throttle on a battery that is half empty |
 //! | `garbage.rs` | inertial samples that are garbage for a twentieth of a second |
 //! | `pressure.rs` | doors, fans, and propellers that press on the barometer in either direction |
 //! | `picture.rs` | a flow sensor of another scale, that is late and askew, in brisk flight |
@@ -12,8 +14,10 @@
 mod centre;
 mod force;
 mod garbage;
+mod packs;
 mod picture;
 mod pressure;
+mod thrust;
 mod turning;
 
 use crate::losses::harness::{Hands, STICKS, Seen};
