@@ -144,13 +144,17 @@ impl Scene {
     /// Distance from a place to the floor along a unit vector that points down, m.
     #[must_use]
     pub fn distance(&self, place: &Vector3<f64>, beam: &Vector3<f64>) -> f64 {
-        let steepness = beam.z + self.slope[0] * beam.x + self.slope[1] * beam.y;
-        let meets = |from: &Vector3<f64>| (self.floor(from) - place.z) / beam.z;
-        if self.slope == [0.0; 2] {
-            // A beam that passes over an edge meets the lower floor.
-            return meets(&(place + beam * (-place.z / beam.z)));
+        if self.slope != [0.0; 2] {
+            let steepness = beam.z + self.slope[0] * beam.x + self.slope[1] * beam.y;
+            return (self.floor(place) - place.z) / steepness.max(1e-3);
         }
-        (self.floor(place) - place.z) / steepness.max(1e-3)
+        let meets = |level: f64| (level - place.z) / beam.z;
+        let Some((beyond, drop)) = &self.edge else { return meets(0.0) };
+        let (upper, lower) = (drop.min(0.0), drop.max(0.0));
+        // A beam that passes over an edge meets the lower floor, and so does one from under the upper one.
+        let is_beyond = beyond.depth(&(place + beam * meets(upper))) > 0.0;
+        let on_upper = is_beyond == (*drop < 0.0) && place.z <= upper + OVERHANG;
+        meets(if on_upper { upper } else { lower })
     }
 
     /// The floor's normal, up, world NED.
@@ -232,6 +236,24 @@ mod tests {
             assert_eq!(pushes, [(0.01, Vector3::new(out, 0.0, 0.0))], "{drop} m");
             let foot = Vector3::new(-0.02 * out, 0.0, upper + 0.002);
             assert_eq!((scene.floor(&foot), scene.inside(&foot).count()), (upper, 0), "{drop} m: a foot");
+        }
+    }
+
+    /// From a metre above the level floor, and leaning by 0.5 to either side.
+    #[test]
+    fn a_beam_ends_on_the_first_floor_that_it_meets() {
+        let lean = |x: f64| Vector3::new(x, 0.0, 1.0).normalize();
+        for drop in [-0.5, -0.06, -0.02, 0.02, 0.7] {
+            let beyond = Beyond { point: [0.0; 2], ahead: [1.0, 0.0] };
+            let scene = Scene { edge: Some((beyond, drop)), ..Scene::LEVEL };
+            let down = |x: f64, beam: Vector3<f64>| scene.distance(&Vector3::new(x, 0.0, -1.0), &beam) * beam.z;
+            let [here, there] = [down(-2.0, lean(0.0)), down(2.0, lean(0.0))];
+            assert!((here - 1.0).abs() < 1e-9 && (there - 1.0 - drop).abs() < 1e-9, "{drop} m: {here}, {there}");
+            // One that leans, just beyond the edge where it has come down to the upper floor, and just before it. The face of a step is not
+            // seen.
+            let upper = 1.0 + drop.min(0.0);
+            let [beyond, before] = [0.01, -0.01].map(|past| down(past - 0.5 * upper, lean(0.5)));
+            assert!((beyond - 1.0 - drop).abs() < 1e-9 && (before - 1.0).abs() < 1e-9, "{drop} m: {beyond}, {before}");
         }
     }
 
