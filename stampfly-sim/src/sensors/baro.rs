@@ -121,3 +121,76 @@ impl Barometer for BaroModel {
         Ok(Sample { at, data })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Conditions;
+    use crate::plant::{Body, Disturbance, Motion};
+
+    /// Of the rotors in a hover, rad/s.
+    const HOVER: f64 = 3_000.0;
+    /// Pressure of the propellers then, as the vehicle says, Pa.
+    const WASH: f64 = 2.5;
+
+    /// It stays where it is, with rotors that turn.
+    #[derive(Debug)]
+    struct Held(Motion);
+
+    impl Body for Held {
+        fn step(&mut self) {}
+
+        fn motion(&self) -> &Motion {
+            &self.0
+        }
+
+        fn nominal_rotor_speed(&self) -> f64 {
+            HOVER
+        }
+
+        fn disturbance(&self) -> Disturbance {
+            Disturbance { wash: WASH, ..Disturbance::NONE }
+        }
+    }
+
+    /// What the propellers add to the pressure at a height, m, when they turn so much faster than in a hover, Pa.
+    fn added(conditions: &Conditions, height: f64, faster: f64) -> f64 {
+        let pressure = |faster: f64| {
+            let mut motion = Motion { rotor_speed: [HOVER * faster; 4], ..Motion::default() };
+            motion.position.z = -height;
+            let world = World::new(Held(motion), Instant::ZERO).with_conditions(conditions.clone());
+            let noise = Noise::stream(1, Stream::Baro);
+            BaroPhysics::new(&world, Instant::ZERO, noise, 1).pressure(Instant::from_millis(100), 0.07, DEVIATION)
+        };
+        // The same noise in both.
+        pressure(faster) - pressure(0.0)
+    }
+
+    fn near(is: f64, expected: f64) -> bool {
+        (is - expected).abs() < 1e-6
+    }
+
+    #[test]
+    fn propellers_press_or_suck_as_they_are_told_and_with_the_square_of_their_speed() {
+        for wash in [1.0, -1.0, 1.4, -1.4, 0.0] {
+            let conditions = Conditions { baro_wash: wash, ..Conditions::GENTLE };
+            assert!(near(added(&conditions, 10.0, 1.0), wash * WASH), "{wash}");
+            assert!(near(added(&conditions, 10.0, 1.5), 2.25 * wash * WASH), "{wash}");
+        }
+    }
+
+    #[test]
+    fn near_the_floor_there_is_more_of_it_by_the_share_that_fades_with_the_height() {
+        for wash in [1.0, -1.0] {
+            for floor in [0.5, 2.0] {
+                let conditions = Conditions { baro_wash: wash, baro_wash_floor: floor, ..Conditions::GENTLE };
+                let share = |height: f64| added(&conditions, height, 1.0) / (wash * WASH) - 1.0;
+                assert!(near(share(0.0), floor), "on it: {}", share(0.0));
+                assert!(near(share(WASH_HEIGHT), floor * (-1f64).exp()), "above it: {}", share(WASH_HEIGHT));
+                let heights = [0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 3.0].map(share);
+                assert!(heights.windows(2).all(|two| two[0] > two[1]), "{heights:?}");
+                assert!(heights[6] < 1e-6 * floor + 1e-9, "three metres above nothing is left: {heights:?}");
+            }
+        }
+    }
+}

@@ -16,6 +16,7 @@ mod physics;
 mod pilot;
 mod scenario;
 mod sensors;
+mod specimens;
 
 use stampfly_sim::plant::WindConfig;
 use stampfly_sim::{Simulation, SimulationConfig};
