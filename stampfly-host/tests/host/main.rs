@@ -1,6 +1,7 @@
 //! What the program does, flown and typed. One binary, because each would build the whole flight stack again:
 //! `cargo test -p stampfly-host --test host replay` runs one file.
 
+mod as_found;
 mod black_box;
 mod calibrate;
 mod cameras;
@@ -35,6 +36,7 @@ mod impact;
 mod in_flight;
 mod late;
 mod leaves;
+mod lift;
 mod live_parameters;
 mod log_tools;
 mod losses;

@@ -11,7 +11,7 @@ struct Case {
     words: &'static str,
 }
 
-const CASES: [Case; 4] = [
+const CASES: [Case; 5] = [
     Case {
         options: &["--seed", "4", "--mission", "arm; takeoff 0.5; hover 2; land", "--wind", "12,0"],
         outcome: "flown-away",
@@ -35,6 +35,12 @@ const CASES: [Case; 4] = [
         ],
         outcome: "landed",
         words: "never left the ground: NO_LIFT",
+    },
+    // Rotors of a bad bag: it turns over as it takes off.
+    Case {
+        options: &["--seed", "5", "--mission", "arm; takeoff 0.5; hover 2; land", "--plant", "manufacturing_spread=5"],
+        outcome: "crashed",
+        words: "TUMBLED",
     },
     // Gains that do not fit each other.
     Case {
@@ -78,6 +84,16 @@ fn says(flight: &Value, case: &Case) {
     assert!(flight["reason"].as_str().is_some_and(|reason| reason.contains(words)), "{options:?}: {flight}");
 }
 
+/// The report that was written last says how it ended and why, and marks it as failed.
+fn on_its_page(folder: &Path, case: &Case) {
+    let page = std::fs::read_to_string(folder.join("flight.html")).expect("a report");
+    let head = "<tr class=\"failed\"><th scope=\"row\">verdict</th><td><b>";
+    let verdict = page.split_once(head).and_then(|(_, rest)| rest.split_once("</b>"));
+    let (verdict, _) = verdict.unwrap_or_else(|| panic!("{:?}: no failed verdict", case.options));
+    let begins = format!("{}: ", case.outcome.to_uppercase());
+    assert!(verdict.starts_with(&begins) && verdict.contains(case.words), "{:?}: {verdict}", case.options);
+}
+
 #[test]
 fn a_flight_that_ends_badly_without_a_fault_has_failed_and_says_why() {
     let folder = folder("bad");
@@ -86,6 +102,7 @@ fn a_flight_that_ends_badly_without_a_fault_has_failed_and_says_why() {
             let (code, out) = run(&folder, &[command, case.options, &["--json"]]);
             assert_eq!(code, Some(1), "{command:?} {:?}", case.options);
             says(&serde_json::from_str(&out).expect("JSON"), case);
+            on_its_page(&folder, case);
         }
         let (code, out) = run(&folder, &[&["campaign", "--flights", "1"], case.options, &["--json"]]);
         let campaign: Value = serde_json::from_str(&out).expect("JSON");
