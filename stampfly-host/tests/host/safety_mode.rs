@@ -107,33 +107,50 @@ fn a_switch_to_a_manual_mode_with_the_stick_in_its_centre_costs_no_height() {
     }
 }
 
-/// The switch is turned during the take-off, and stays there.
+/// The switch is turned so many seconds after the take-off began, and stays there.
+fn chosen_on_the_way_up(seed: u64, mode: FlightMode, after: f32, throttle: f32) -> (Seen, Instant) {
+    let (since, note) = instant();
+    let seen = run(seed, 20.0, |mut hands| {
+        Box::pin(async move {
+            let rest = PilotInput { throttle, ..STICKS };
+            let flown = PilotInput { arm: true, ..rest };
+            while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
+                send(&mut hands, 0.1, rest).await;
+            }
+            while hands.telemetry().phase != FlightPhase::TakeOff {
+                send(&mut hands, 0.02, flown).await;
+            }
+            send(&mut hands, after, flown).await;
+            note.set(hands.clock.now());
+            send(&mut hands, 5.0, PilotInput { mode, ..flown }).await;
+            hands.leave();
+        })
+    });
+    (seen, since.get())
+}
+
+/// With the stick in its centre, and with one that stayed at its lowest.
 #[test]
 fn a_manual_mode_that_is_chosen_on_the_way_up_does_not_drop_the_vehicle() {
     for seed in 1..=thorough(2, 40) {
         for mode in [FlightMode::Stabilize, FlightMode::Acro] {
-            let (since, note) = instant();
-            let seen = run(seed, 20.0, |mut hands| {
-                Box::pin(async move {
-                    let flown = PilotInput { arm: true, ..STICKS };
-                    while hands.telemetry().phase != FlightPhase::IdleGround || !hands.telemetry().blocks.is_empty() {
-                        send(&mut hands, 0.1, STICKS).await;
+            for after in [0.0, 0.4, 0.8, 1.5] {
+                for throttle in [0.0, -1.0] {
+                    let (seen, since) = chosen_on_the_way_up(seed, mode, after, throttle);
+                    let until = since + Duration::from_seconds(4.9);
+                    let what = format!("{mode:?} after {after} s, throttle {throttle}, seed {seed}");
+                    let (mut highest, mut lost) = (0.0f32, 0.0f32);
+                    for (_, truth) in seen.truths.iter().filter(|(at, _)| (since..=until).contains(at)) {
+                        highest = highest.max(-truth.position.z);
+                        lost = lost.max(highest + truth.position.z);
                     }
-                    while hands.telemetry().phase != FlightPhase::TakeOff {
-                        send(&mut hands, 0.02, flown).await;
-                    }
-                    while hands.telemetry().phase == FlightPhase::TakeOff {
-                        send(&mut hands, 0.02, PilotInput { mode, ..flown }).await;
-                    }
-                    note.set(hands.clock.now());
-                    send(&mut hands, 3.0, PilotInput { mode, ..flown }).await;
-                    hands.leave();
-                })
-            });
-            let until = since.get() + Duration::from_seconds(2.9);
-            let lost = lost_height(&seen, since.get(), until);
-            assert!(lost <= 0.3, "{mode:?}, seed {seed}: {lost} m");
-            assert_eq!(at(&seen, until).1, FlightMode::AltHold, "{mode:?}");
+                    println!("{what}: to {highest:.2} m, {lost:.2} m lost");
+                    assert!(highest > 0.4, "{what}: to {highest} m");
+                    assert!(lost <= 0.3, "{what}: {lost} m");
+                    let (phase, mode, _) = at(&seen, until);
+                    assert_eq!((phase, mode), (FlightPhase::Flying, FlightMode::AltHold), "{what}");
+                }
+            }
         }
     }
 }
