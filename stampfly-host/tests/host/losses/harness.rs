@@ -12,7 +12,7 @@ use stampfly_drivers::{
     Barometer, Button, Imu, Magnetometer, MotorOutputs, OpticalFlow, PowerMonitor, RangeFinder, Sample,
 };
 use stampfly_flight::newest::message;
-use stampfly_sim::plant::Hand;
+use stampfly_sim::plant::{Hand, RotorFault};
 use stampfly_sim::sensors::{ButtonModel, MotorModel, Sensors};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::vehicle::{self, FlightOptions};
@@ -119,6 +119,11 @@ impl Hands<'_> {
             scene.hand = holds.then_some(Hand { position: motion.position, attitude: motion.attitude });
         });
         now
+    }
+
+    /// This rotor has this share of its thrust from now on.
+    pub fn weaken(&self, rotor: usize, thrust: f64) {
+        self.world.set_rotor_fault(self.clock.now(), rotor, RotorFault { thrust, ..RotorFault::NONE });
     }
 
     /// Nothing more is to be seen: ends the flight. In the thorough size it goes on until its time is over.
