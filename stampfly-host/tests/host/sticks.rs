@@ -2,16 +2,21 @@
 
 use crate::program::folder;
 use serde_json::Value;
+use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::{Outcome, StampFly};
+use stampfly_board::topics::Id;
+use stampfly_flight::Observer;
+use stampfly_flight::newest::message;
 use stampfly_host::campaign::sticks::{cells, files, fly_one, sums};
 use stampfly_host::flown::fly;
 use stampfly_host::log::info::Info;
 use stampfly_host::log::refly::{facts, refly};
+use stampfly_sim::Truth;
 use stampfly_sim::recorder::Recorder;
 use stampfly_sim::sticks::{StickFile, StickOptions};
-use stampfly_sim::vehicle::{Options, Vehicle, Verdict as _};
+use stampfly_sim::vehicle::{Options, Vehicle, Verdict as _, Witness};
 use stampfly_types::Instant;
-use stampfly_types::messages::{FlightMode, FlightPhase};
+use stampfly_types::messages::{FlightMode, FlightPhase, PilotInput};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -161,6 +166,81 @@ fn a_campaign_flies_a_file_with_one_mode_in_every_mode_and_others_as_they_are() 
     let sums = sums(&flights);
     assert_eq!((sums.len(), sums[0].flights, sums[0].ended_well), (1, 2, 2));
     assert!(sums[0].while_sound.is_empty());
+}
+
+/// What is true from when the vehicle hears these sticks on: throttle, roll, pitch, yaw.
+#[derive(Default)]
+struct Heard {
+    sticks: [f32; 4],
+    /// For so long, s.
+    seconds: f32,
+    since: Option<Instant>,
+    truths: Vec<Truth>,
+}
+
+impl Observer for Heard {}
+
+impl Witness<Runnables> for Heard {
+    fn published(&mut self, topic: usize, at: Instant, _: u32, words: &[u32]) {
+        if Id::ALL.get(topic) != Some(&Id::command_pilot) {
+            return;
+        }
+        let Some(PilotInput { throttle, roll, pitch, yaw, .. }) = message(words) else { return };
+        let near = [throttle, roll, pitch, yaw].iter().zip(self.sticks).all(|(is, wanted)| (is - wanted).abs() < 0.01);
+        self.since = self.since.or(near.then_some(at));
+    }
+
+    fn beside(&mut self, _: usize, at: Instant, _: u32, words: &[u32]) {
+        if self.since.is_some_and(|since| at.since(since).seconds() < self.seconds) {
+            self.truths.extend(message::<Truth>(words));
+        }
+    }
+}
+
+/// North and east, m, clockwise, rad, and up, m: how far it has gone when the sticks were so for so many seconds, and at rest for
+/// half a second.
+fn moved(mode: &str, hover: f32, sticks: [f32; 4], seconds: f32) -> [f32; 4] {
+    let row =
+        |t: f32, [throttle, roll, pitch, yaw]: [f32; 4]| format!("{t},{throttle},{roll},{pitch},{yaw},{mode},1,0");
+    let rest = [hover, 0.0, 0.0, 0.0];
+    let rows = [row(0.0, rest), row(0.5, sticks), row(0.5 + seconds, rest), row(1.1 + seconds, rest)];
+    let mut options = options(&rows.join("\n"));
+    options.sticks.as_mut().expect("sticks").from_height = Some(1.5);
+    let setup = StampFly::setup(&options, 1).expect("options");
+    let mut heard = Heard { sticks, seconds: seconds + 0.5, ..Heard::default() };
+    fly::<StampFly>(&setup, &mut heard, &mut |_, _| {});
+    let (first, last) = heard.truths.first().zip(heard.truths.last()).expect("it hears them");
+    let [north, east, down] = (last.position - first.position).into();
+    let turned = heard.truths.iter().map(|truth| truth.angular_rate.z * 0.0025).sum();
+    [north, east, turned, -down]
+}
+
+/// The signs that `docs/sticks.md` promises, from the file to what the vehicle does while it looks north.
+#[test]
+fn sticks_move_the_vehicle_the_way_the_page_says() {
+    // The throttle with which it stays at its height; in a manual mode about that. How far the others go there, and for how long: a
+    // lean that is kept carries it farther, and in ACRO the stick turns it further and further.
+    for (mode, hover, stick, seconds) in [
+        ("poshold", 0.0, 0.5, 1.5),
+        ("althold", 0.0, 0.5, 0.5),
+        ("stabilize", 0.58, 0.5, 0.5),
+        ("acro", 0.58, 0.15, 0.5),
+    ] {
+        for sign in [1.0f32, -1.0] {
+            let stick = sign * stick;
+            let up = moved(mode, hover, [hover + 0.3 * sign, 0.0, 0.0, 0.0], seconds);
+            let right = moved(mode, hover, [hover, stick, 0.0, 0.0], seconds);
+            let forward = moved(mode, hover, [hover, 0.0, stick, 0.0], seconds);
+            let clockwise = moved(mode, hover, [hover, 0.0, 0.0, 0.5 * sign], seconds);
+            println!("{mode} {sign}: pitch {forward:.2?}, roll {right:.2?}, yaw {clockwise:.2?}, throttle {up:.2?}");
+            let what = |stick: &str, moved: [f32; 4]| format!("{mode}, {stick} to {sign}: {moved:?}");
+            let straight = |along: f32, aside: f32| sign * along > 0.15 && aside.abs() < 0.5 * along.abs();
+            assert!(straight(forward[0], forward[1]), "{}", what("pitch", forward));
+            assert!(straight(right[1], right[0]), "{}", what("roll", right));
+            assert!(sign * clockwise[2] > 0.1, "{}", what("yaw", clockwise));
+            assert!(sign * up[3] > 0.04, "{}", what("throttle", up));
+        }
+    }
 }
 
 /// Exit code, standard output and standard error.
