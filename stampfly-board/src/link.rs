@@ -211,7 +211,9 @@ impl<'b> Link<'b> {
         command: GuidedCommand,
     ) {
         let is_numbered = matches!(received.payload, Payload::Numbered { .. });
-        if is_numbered && let Some((_, why)) = self.denied.as_ref().filter(|(denied, _)| *denied == counter) {
+        let denied = self.denied.as_ref().filter(|(denied, _)| is_numbered && *denied == counter);
+        // What ends a flight is done whenever it comes.
+        if let Some((_, why)) = denied.filter(|_| !deed.ends_a_flight()) {
             // The station has not heard it yet. It is not done when the vehicle's state has changed since: the answer may be on its way.
             self.refused = Some(Refused::new(counter, why, 1));
             return;

@@ -234,6 +234,10 @@ impl Waited {
         if lands || self.deed.has_happened(status) {
             return Some(Ok(()));
         }
+        // A vehicle that turns over remembers it, and lands as soon as it is level.
+        if self.deed.ends_a_flight() && status.phase == FlightPhase::Flip {
+            return None;
+        }
         let is_refused = self.deed == Deed::Arm && refusals != self.refused;
         (is_refused || now.since(self.since) >= SOON).then(|| Err(why_not(status)))
     }

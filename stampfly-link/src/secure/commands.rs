@@ -1,7 +1,7 @@
 //! Commands that are said until the vehicle acknowledges them: a station's way over a link that loses frames.
 //!
 //! One after the other, in the order they were given. The vehicle takes each once, however often it hears it, so a second way-point is never the first one said
-//! again. A kill goes before all others and ends them. For commands; sticks are newer every time, and to write a parameter twice is to write it once. No
+//! again. A kill goes before all others and ends them; a landing and a disarming go before all but a kill, and end what flies on. For commands; sticks are newer every time, and to write a parameter twice is to write it once. No
 //! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station), and hand back what is acknowledged. A vehicle remembers the
 //! newest number alone: it may take a command twice that is said again after it has restarted, or after another station with its key has commanded.
 
@@ -33,6 +33,11 @@ impl Said {
     const fn is_kill(&self) -> bool {
         matches!(self.command.kind, GuidedKind::Kill)
     }
+
+    /// Does it end a flight? It waits for no command before it: one that the vehicle does not do is said for a second.
+    const fn ends_a_flight(&self) -> bool {
+        matches!(self.command.kind, GuidedKind::Kill | GuidedKind::Land | GuidedKind::Disarm)
+    }
 }
 
 /// Commands on their way to one vehicle.
@@ -56,7 +61,8 @@ impl Said {
 #[derive(Clone, Debug)]
 pub struct Commands {
     /// The one that is being said, and those behind it.
-    waiting: [Option<Said>; WAITING + 1],
+    /// There is always room for a kill and for another one that ends a flight.
+    waiting: [Option<Said>; WAITING + 2],
     /// Was the frame of a kill before this one without a number?
     was_plain: bool,
 }
@@ -71,11 +77,12 @@ impl Commands {
     /// None.
     #[must_use]
     pub const fn new() -> Self {
-        Self { waiting: [None; WAITING + 1], was_plain: false }
+        Self { waiting: [None; WAITING + 2], was_plain: false }
     }
 
     /// Takes a command. `number` is one that no command to this vehicle had lately: count on from a random one, or after a
     /// restart a vehicle could think that it has taken it. `false` when four wait. For a kill there is always room; a kill takes the place of a kill.
+    /// A landing and a disarming go before all but a kill and each other.
     pub fn say(&mut self, now: Instant, number: u32, command: GuidedCommand) -> bool {
         self.say_since(now, now, number, command)
     }
@@ -88,7 +95,12 @@ impl Commands {
         };
         let said = Said { number, command, until, again_at: now };
         if !said.is_kill() {
-            let place = self.waiting.iter_mut().take(WAITING).find(|place| place.is_none());
+            let free = |place: &&mut Option<Said>| place.is_none();
+            let place = if said.ends_a_flight() {
+                self.make_way(now)
+            } else {
+                self.waiting.iter_mut().take(WAITING).find(free)
+            };
             return place.map(|place| *place = Some(said)).is_some();
         }
         self.end(now);
@@ -99,6 +111,15 @@ impl Commands {
         self.waiting.first_mut().into_iter().for_each(|first| *first = Some(said));
         self.was_plain = false;
         true
+    }
+
+    /// Ends the commands that fly on, and frees the place behind those that end a flight. `None` when these have every place.
+    fn make_way(&mut self, now: Instant) -> Option<&mut Option<Said>> {
+        self.waiting.iter_mut().flatten().filter(|said| !said.ends_a_flight()).for_each(|said| said.until = now);
+        let before = self.waiting.iter().take_while(|place| place.is_some_and(|said| said.ends_a_flight())).count();
+        let rest = self.waiting.get_mut(before..).filter(|rest| rest.last().is_some_and(Option::is_none))?;
+        rest.rotate_right(1);
+        rest.first_mut()
     }
 
     /// Ends the commands that wait: the motors are to be off, and somebody has said so otherwise than with a command.

@@ -135,6 +135,30 @@ fn a_vehicle_without_room_is_told_again_and_again() {
     assert_eq!(pair.over, [8]);
 }
 
+/// The vehicle does not do the first ones, and says so only after their second.
+#[test]
+fn what_ends_a_flight_waits_for_no_command_before_it() {
+    use GuidedKind::{Disarm, Hold, Kill, Land, WayPoint};
+    for ends in [Land, Disarm] {
+        let (mut commands, now) = (Commands::new(), Instant::from_secs(100));
+        for (number, kind) in (0..).zip([Hold, WayPoint, Hold, WayPoint]) {
+            assert!(commands.say(now, number, command(kind)));
+        }
+        assert!(matches!(commands.next(now), Some(Payload::Numbered { number: 0, .. })));
+        assert!(commands.say(now, 4, command(ends)), "there is room");
+        assert_eq!(commands.next(now), Some(Payload::Numbered { number: 4, command: command(ends) }));
+        let over: Vec<_> = core::iter::from_fn(|| commands.over(now)).collect();
+        assert_eq!(over, [0, 1, 2, 3]);
+        // Another one comes behind it, and a kill before both.
+        assert!(commands.say(now, 5, command(Land)) && commands.say(now, 6, command(Kill)));
+        assert_eq!(commands.next(now), Some(Payload::Kill));
+        assert_eq!(core::iter::from_fn(|| commands.over(now)).count(), 2);
+        assert!(commands.acknowledge(6, true));
+        let fly_on = commands.say(now, 7, command(Hold)) && commands.say(now, 8, command(Land));
+        assert!(fly_on && matches!(commands.next(now), Some(Payload::Numbered { number: 8, .. })));
+    }
+}
+
 #[test]
 fn what_is_older_than_a_second_is_not_said_but_a_kill_and_a_landing_are() {
     use GuidedKind::{Arm, Hold, Kill, Land};
@@ -226,13 +250,13 @@ fn what_a_kill_has_ended_leaves_its_room_and_a_kill_by_the_sticks_ends_it_too() 
 #[test]
 fn a_command_that_is_refused_is_not_said_again_and_the_next_one_is() {
     let (mut commands, now) = (Commands::new(), Instant::ZERO);
-    for (number, kind) in [(7, GuidedKind::TakeOff), (8, GuidedKind::Land)] {
+    for (number, kind) in [(7, GuidedKind::TakeOff), (8, GuidedKind::Hold)] {
         assert!(commands.say(now, number, command(kind)));
     }
     assert!(commands.next(now).is_some());
     assert!(!commands.refuse(8), "it was not said yet");
     assert!(commands.refuse(7) && !commands.refuse(7));
-    assert_eq!(commands.next(now), Some(Payload::Numbered { number: 8, command: command(GuidedKind::Land) }));
+    assert_eq!(commands.next(now), Some(Payload::Numbered { number: 8, command: command(GuidedKind::Hold) }));
     assert_eq!(commands.over(now + Duration::from_secs(2)), Some(8));
 
     assert!(commands.say(now, 9, command(GuidedKind::Kill)));
