@@ -323,9 +323,9 @@ mod tests {
     fn the_chain_has_bars_on_one_machine() {
         assert!(MACHINES.iter().any(|machine| machine.name == BAR.0));
         let chain = |mean, most| Count { name: CHAIN.to_owned(), budget: None, mean, most };
-        assert!(within_bar("Cortex-M4F", &chain(12_600.0, 22_200.0)).is_ok());
-        assert!(within_bar("Cortex-M4F", &chain(12_601.0, 22_200.0)).is_err());
-        assert!(within_bar("Cortex-M4F", &chain(12_600.0, 22_201.0)).is_err());
+        assert!(within_bar("Cortex-M4F", &chain(13_600.0, 23_200.0)).is_ok());
+        assert!(within_bar("Cortex-M4F", &chain(13_601.0, 23_200.0)).is_err());
+        assert!(within_bar("Cortex-M4F", &chain(13_600.0, 23_201.0)).is_err());
         assert!(within_bar("Xtensa", &chain(30_000.0, 56_000.0)).is_ok());
     }
 
