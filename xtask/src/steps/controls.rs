@@ -45,11 +45,21 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
 }
 
-/// A clone of the last commit.
+/// A clone of the last commit. One that is there from before is brought up to it: files that are as they were keep their
+/// times, and nothing is built for them again.
 fn cloned(repository: &Repository) -> Result<PathBuf, Failure> {
     let clone = repository.target(FOLDER).join("clone");
-    let _ = fs::remove_dir_all(&clone);
-    run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
+    let brought_up = [&["fetch", "--quiet", "origin", "HEAD"][..], &["reset", "--quiet", "--hard", "FETCH_HEAD"]];
+    let is_there = clone.join(".git").is_dir()
+        && brought_up.iter().all(|arguments| {
+            let mut git = repository.command("git");
+            git.current_dir(&clone).args(*arguments);
+            run_program(&mut git).is_ok()
+        });
+    if !is_there {
+        let _ = fs::remove_dir_all(&clone);
+        run_program(repository.command("git").args(["clone", "--quiet", "--local", "."]).arg(&clone))?;
+    }
     Ok(clone)
 }
 
