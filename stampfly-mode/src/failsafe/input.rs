@@ -1,8 +1,7 @@
 //! What the failsafe looks at in one step. Everything is borrowed.
 
-use stampfly_types::math::smaller;
 use stampfly_types::messages::{
-    ControlOutput, EstimatorStatus, FlightStatus, ImuData, PowerData, SelfTestVerdict, StateEstimate,
+    ControlOutput, EstimatorStatus, FlightStatus, ImuData, MotorOutput, PowerData, SelfTestVerdict, StateEstimate,
 };
 use stampfly_types::{Instant, Stamped, Vec3};
 
@@ -41,11 +40,9 @@ pub struct FailsafeInput<'a> {
 
 impl FailsafeInput<'_> {
     /// Torque that the motors were told to make, body axes, N·m: what was asked for, less what was
-    /// unmet. A number that is no share counts as none.
+    /// unmet.
     pub(super) fn torque(&self) -> Vec3 {
-        let [roll, pitch, yaw, _] = self.unmet;
-        let met = |unmet: f32| if unmet > 0.0 { 1.0 - smaller(unmet, 1.0) } else { 1.0 };
-        let asked = self.output.torque;
-        Vec3::new(asked.x * met(roll), asked.y * met(pitch), asked.z * met(yaw))
+        let [roll, pitch, yaw, _] = self.unmet.map(MotorOutput::met);
+        self.output.torque.component_mul(&Vec3::new(roll, pitch, yaw))
     }
 }

@@ -32,7 +32,9 @@ use core::fmt;
 use flight::{Flight, FlightStage};
 use seen::Seen;
 use stampfly_types::Instant;
-use stampfly_types::messages::{ControlOutput, FlightPhase, GroundContact, LandDetected, Setpoint, StateEstimate};
+use stampfly_types::messages::{
+    ControlOutput, FlightPhase, GroundContact, LandDetected, MotorOutput, Setpoint, StateEstimate,
+};
 use weight::WeightTest;
 
 /// What the manager looks at.
@@ -52,10 +54,9 @@ pub struct LandingInput<'a> {
 }
 
 impl LandingInput<'_> {
-    /// Thrust that the motors were told to make, N. A number that is no share counts as none.
+    /// Thrust that the motors were told to make, N.
     fn thrust(&self) -> f32 {
-        let unmet = if self.unmet.abs() <= 1.0 { self.unmet } else { 0.0 };
-        self.demand.thrust * (1.0 - unmet)
+        self.demand.thrust * MotorOutput::met(self.unmet)
     }
 }
 

@@ -29,6 +29,26 @@ message! {
     }
 }
 
+impl MotorOutput {
+    /// The share that was met, from 0 to 1, where this one was [unmet](Self::unmet). A number that
+    /// is not a share counts as none: the whole demand was met.
+    ///
+    /// ```
+    /// use stampfly_types::messages::MotorOutput;
+    /// assert_eq!([0.0, 0.25, 2.0, -1.0, f32::NAN].map(MotorOutput::met), [1.0, 0.75, 0.0, 1.0, 1.0]);
+    /// ```
+    #[must_use]
+    pub const fn met(unmet: f32) -> f32 {
+        if unmet >= 1.0 {
+            0.0
+        } else if unmet > 0.0 {
+            1.0 - unmet
+        } else {
+            1.0
+        }
+    }
+}
+
 /// The largest number of servos a message can carry.
 pub const MAX_SERVOS: usize = 8;
 

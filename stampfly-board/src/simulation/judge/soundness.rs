@@ -74,8 +74,8 @@ pub(super) struct Soundness {
     battery_critical: f32,
     estimate: StateEstimate,
     torque: Vec3,
-    /// Shares of it that were not met.
-    unmet: Vec3,
+    /// Shares of it that the motors made.
+    met: Vec3,
     /// What the motors have made of it, behind their lag.
     made: Vec3,
     steps: VecDeque<Turned>,
@@ -93,7 +93,7 @@ impl Soundness {
             battery_critical: config.failsafe.battery_critical,
             estimate: StateEstimate::default(),
             torque: Vec3::zeros(),
-            unmet: Vec3::zeros(),
+            met: Vec3::repeat(1.0),
             made: Vec3::zeros(),
             steps: VecDeque::new(),
             strikes: 0,
@@ -113,11 +113,8 @@ impl Soundness {
     }
 
     pub fn driven(&mut self, output: &MotorOutput) {
-        let [roll, pitch, yaw, _] = output.unmet;
-        self.unmet = Vec3::new(roll, pitch, yaw);
-        if !output.armed {
-            self.unmet = Vec3::repeat(1.0);
-        }
+        let [roll, pitch, yaw, _] = output.unmet.map(MotorOutput::met);
+        self.met = if output.armed { Vec3::new(roll, pitch, yaw) } else { Vec3::zeros() };
     }
 
     /// Looks at the truth. `faulty`: a fault is active.
@@ -159,7 +156,7 @@ impl Soundness {
     /// Have the rates of the last tenth of a second changed as the torque says?
     fn follows(&mut self, now: Instant, truth: &Truth) -> bool {
         let inertia = AIRFRAME.inertia;
-        let met = self.torque.component_mul(&(Vec3::repeat(1.0) - self.unmet));
+        let met = self.torque.component_mul(&self.met);
         let (rate, last) = (truth.angular_rate, self.steps.back().copied());
         let by_torque = last.map_or_else(Vec3::zeros, |last| {
             let dt = now.since(last.at).seconds();
