@@ -6,7 +6,8 @@
 //! Who commands is the [`Helm`]'s decision, the same one that services ask: a station has a seat of its own, [`Seat::Link`], and the paired transmitter
 //! [`Seat::Transmitter`]. A station whose command or sticks are refused is told who commands, and a station in session is told what others ask of the vehicle.
 //!
-//! A command is acknowledged when the vehicle's state shows that it has happened, as at a cable, and refused with the reason when it does not: see [`deed`](stampfly_services::deed).
+//! A command is acknowledged when the vehicle's state shows that it has happened, as at a cable,
+//! and refused with the reason when it does not: see [`deed`](stampfly_services::deed).
 
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
@@ -14,7 +15,7 @@ use core::fmt::{Display, Write as _};
 use heapless::String;
 use stampfly_link::secure::{Guarded, Heard, Held, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
-use stampfly_services::deed::{Deed, TOO_MANY, Waited};
+use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
 use stampfly_services::{Helm, Passed, Refusal, Seat, Told};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightStatus, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
@@ -75,7 +76,8 @@ pub struct Link<'b> {
     /// Where stations are, and their seats, the newest first.
     stations: [Option<(Address, Seat)>; STATIONS],
     refused: Option<Refused>,
-    /// The newest command with a number that was refused, and why: it is refused again when it is said again.
+    /// The newest command with a number that was refused, and why: it is refused again when it is
+    /// said again.
     denied: Option<(u32, String<TEXT>)>,
     waits: [Option<(Held, Waited)>; WAITS],
     sticks_refused: Option<Instant>,
@@ -180,7 +182,7 @@ impl<'b> Link<'b> {
         if let Payload::Sticks(input) = received.payload {
             let is_due = self.sticks_refused.is_none_or(|last| at.since(last) >= STICKS_AGAIN);
             match self.steer(helm, at, seat, &input) {
-                // What is said once of a command is not overwritten.
+                // The refusal of a command waits to be sent, and is not overwritten.
                 Err(why) if is_due && self.refused.is_none() => {
                     (self.sticks_refused, self.refused) = (Some(at), Some(Refused::new(counter, &why, 1)));
                 }
@@ -212,13 +214,14 @@ impl<'b> Link<'b> {
     ) {
         let is_numbered = matches!(received.payload, Payload::Numbered { .. });
         let denied = self.denied.as_ref().filter(|(denied, _)| is_numbered && *denied == counter);
-        // What ends a flight is done whenever it comes.
+        // A command that ends a flight is done whenever it arrives.
         if let Some((_, why)) = denied.filter(|_| !deed.ends_a_flight()) {
-            // The station has not heard it yet. It is not done when the vehicle's state has changed since: the answer may be on its way.
+            // The station repeats it until it receives the refusal. The refusal stands when the
+            // vehicle's state has changed since: it may be on its way.
             self.refused = Some(Refused::new(counter, why, 1));
             return;
         }
-        // Who commands is told before what the vehicle would say.
+        // The refusal names the commander rather than the state of the vehicle.
         if let Some(holder) = helm.holder(at).filter(|holder| *holder != seat && !deed.ends_a_flight()) {
             return self.deny(counter, is_numbered, &Refusal::Occupied(holder));
         }
@@ -235,7 +238,11 @@ impl<'b> Link<'b> {
                 // A free place, or the oldest one's.
                 let place = self.waits.iter_mut().min_by_key(|place| place.map(|(_, waited)| waited.since()));
                 let held = self.guarded.hold(received);
-                place.into_iter().for_each(|place| *place = held.map(|held| (held, waited)));
+                let before = place.and_then(|place| core::mem::replace(place, held.map(|held| (held, waited))));
+                if let Some((overtaken, _)) = before {
+                    self.guarded.settle(overtaken, false);
+                    self.refused = Some(Refused::new(overtaken.counter(), &OVERTAKEN, NOTICES));
+                }
             }
             // It is said again: there may be room then.
             Err(Refusal::Full) => self.guarded.acknowledge(received, false),
@@ -250,7 +257,8 @@ impl<'b> Link<'b> {
         self.refused = Some(Refused::new(counter, why, 1));
     }
 
-    /// Acknowledges a command that is seen to have happened, or says of one why it did not: one in a turn.
+    /// Acknowledges a command that is seen to have happened, or says of one why it did not: one in
+    /// a turn.
     fn settle(&mut self, now: Instant) {
         let (status, refusals) = (self.status(), self.refusals());
         let settled = self.waits.iter_mut().find_map(|place| {
@@ -263,12 +271,12 @@ impl<'b> Link<'b> {
         self.guarded.settle(held, result.is_ok());
         if let Err(why) = result {
             let mut words = String::<TEXT>::new();
-            // What is too long is cut.
+            // A longer text is cut.
             _ = write!(words, "refused: {why}");
             if held.is_numbered() {
                 self.denied = Some((held.counter(), words.clone()));
             }
-            // A station does not say it again for so long.
+            // The station no longer repeats the command, so the vehicle repeats the refusal.
             self.refused = Some(Refused::new(held.counter(), &words, NOTICES));
         }
     }

@@ -226,8 +226,8 @@ impl Waited {
         self.look_at(now, &cockpit.view().state(), refusals(cockpit))
     }
 
-    /// The same for who has no cockpit: the vehicle is in this state, and has refused to arm so many
-    /// times.
+    /// The same for who has no cockpit: the vehicle is in this state, and has refused to arm so
+    /// many times.
     #[must_use]
     pub fn look_at(&self, now: Instant, status: &FlightStatus, refusals: u32) -> Option<Result<(), &'static str>> {
         let lands = self.deed == Deed::Disarm && status.phase == FlightPhase::Landing;

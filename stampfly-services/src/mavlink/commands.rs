@@ -226,9 +226,13 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             say(self.client, deed.denied(), &refusal, self.put);
             return Some(result(Err(refusal)));
         }
-        let has_happened = deed.has_happened(&status);
-        let waits = !has_happened && self.orders.wait(self.now, asked, self.seat, Rise::Asked, self.cockpit);
-        (!waits).then_some(MavResult::MAV_RESULT_ACCEPTED)
+        if deed.has_happened(&status) {
+            return Some(MavResult::MAV_RESULT_ACCEPTED);
+        }
+        // The vehicle was asked; without room to wait, the program asks again and hears how it
+        // stands.
+        let waits = self.orders.wait(self.now, asked, self.seat, Rise::Asked, self.cockpit);
+        (!waits).then_some(MavResult::MAV_RESULT_IN_PROGRESS)
     }
 
     /// Would arming be refused? Then every reason is said. Silence of all programs is none: the

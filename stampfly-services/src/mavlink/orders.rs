@@ -17,9 +17,10 @@ use stampfly_link::mavlink::dialects::common::{MavResult, MavSeverity};
 use stampfly_types::messages::{FlightPhase, GuidedCommand};
 use stampfly_types::{Duration, Instant, Vec3};
 
-/// Commands that are waited for at once. A program that asks for more is told to try later, unless
-/// it ends a flight.
+/// Commands that are waited for at once. A program that asks for more is told to try later.
 const AT_ONCE: usize = 3;
+/// More of them, for commands that end a flight.
+const ENDING: usize = 3;
 /// No landing takes longer.
 const LANDING: Duration = Duration::from_secs(60);
 /// Between two acknowledgements that it goes on.
@@ -69,7 +70,7 @@ struct Order<C> {
 /// Those that are waited for.
 #[derive(Clone, Debug)]
 pub(super) struct Orders<C> {
-    all: Vec<Order<C>, AT_ONCE>,
+    all: Vec<Order<C>, { AT_ONCE + ENDING }>,
 }
 
 /// How far one is.
@@ -87,8 +88,9 @@ impl<C: Copy + PartialEq> Orders<C> {
         Self { all: Vec::new() }
     }
 
+    /// Is there room only for commands that end a flight?
     pub fn is_full(&self) -> bool {
-        self.all.is_full()
+        self.all.len() >= AT_ONCE
     }
 
     /// Is it waited for already? Sent again, it is not done again.

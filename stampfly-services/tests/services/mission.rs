@@ -226,9 +226,10 @@ fn an_item_that_does_not_come_is_asked_for_again_and_given_up_after_a_while() {
     let error = MavMissionResult::MAV_MISSION_ERROR;
     assert!(matches!(&scene.says(late)[..], [MavMessage::MISSION_ACK(ack)] if ack.mavtype == error));
 
-    // One that comes twice, or too early, is passed over: the timer asks for the right one. It is not
-    // named as MAV_MISSION_INVALID_SEQUENCE, because an acknowledgement that is no acceptance ends the
-    // upload at its partner, and a network that delays or doubles a datagram would end it so.
+    // One that comes twice, or too early, is passed over: the timer asks for the right one. It is
+    // not named as MAV_MISSION_INVALID_SEQUENCE, because an acknowledgement that is no acceptance
+    // ends the upload at its partner, and a network that delays or doubles a datagram would end it
+    // so.
     scene.says(count(3));
     for (seq, next) in [(1, None), (0, Some(1)), (0, None), (2, None)] {
         let item = MISSION_ITEM_INT_DATA { seq, ..take_off() };

@@ -310,8 +310,15 @@ fn there_is_room_for_three_and_always_for_what_ends_a_flight() {
     let hold = scene.asks([255, 0], MavCmd::MAV_CMD_NAV_LOITER_UNLIM, OFF);
     assert_eq!(hold.results(), [MavResult::MAV_RESULT_TEMPORARILY_REJECTED]);
     scene.asked();
-    assert_eq!(scene.asks([255, 4], ARM, KILL).results(), [ACCEPTED], "it has reached the vehicle");
+    // It has reached the vehicle, which turns its motors still.
+    assert_eq!(scene.asks([255, 4], ARM, KILL), Said::default());
     assert_eq!(scene.asked(), [GuidedKind::Kill]);
+    for component in 5..9 {
+        let said = scene.asks([255, component], ARM, KILL);
+        let no_room = if component > 6 { &[MavResult::MAV_RESULT_IN_PROGRESS][..] } else { &[] };
+        assert_eq!(said.results(), no_room, "{component}");
+        assert_eq!(scene.asked(), [GuidedKind::Kill]);
+    }
     scene.vehicle.status(|status| status.phase = FlightPhase::Landing);
     let said = scene.passes(20);
     let told: Vec<_> = said.results.iter().map(|(_, result, [_, component])| (*result, *component)).collect();
