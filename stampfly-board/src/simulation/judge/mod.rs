@@ -25,8 +25,8 @@
 //! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound. Where
 //! the file begins armed, `refused` is not.
 //!
-//! A flight that [flies on](VehicleConfig::flies_on) where a protection would have stopped its motors in the air is over as
-//! soon as it has crashed or flown away, and ends as that.
+//! A flight that [flies on](VehicleConfig::flies_on) where a protection would have stopped its
+//! motors in the air is over as soon as it has crashed or flown away, and ends as that.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -132,8 +132,8 @@ pub struct Judgement {
     pub alerts: Vec<AlertSpan>,
     /// What the vehicle did by itself that changed the flight, in order.
     pub interventions: Vec<Intervention>,
-    /// The protections that stopped the motors in the air, the first time that some did: alerts with `+` between two, or
-    /// `CUT_OFF`.
+    /// The protections that stopped the motors in the air, the first time that some did: alerts
+    /// with `+` between two, or `CUT_OFF`.
     pub cut_in_air: Option<String>,
     /// Faults, as they were given.
     pub faults: Vec<FaultSpan>,
@@ -351,10 +351,12 @@ impl Judge {
         self.last = Some(*truth);
     }
 
-    /// Is there nothing more to come of a fault? The motors are off, and whoever commands waits for something else. Or it flies
-    /// on to see what comes of it, and has crashed or flown away.
+    /// Has the flight shown all that comes of a fault? The motors are off, and the mission waits
+    /// for something else. A flight that flies on is over when the vehicle has crashed or flown
+    /// away. A stick file has no path that it could leave.
     pub fn is_over(&self, now: Instant) -> bool {
-        if self.flies_on && (self.flew_away().is_some() || self.crash(self.injector.first_begun(now)).is_some()) {
+        let flew_away = self.sticks.is_none() && self.flew_away().is_some();
+        if self.flies_on && (flew_away || self.crash(self.injector.first_begun(now)).is_some()) {
             return true;
         }
         let Some(begun) = self.injector.first_begun(now) else { return false };
@@ -510,6 +512,8 @@ impl Judge {
             self.interventions.list().iter().find(|one| one.action == "cut" && one.height_m > OFF_GROUND.into());
         if !self.turned {
             (Class::Refused, "the motors never turned".into())
+        } else if let Some(crash) = crash.as_ref().filter(|_| self.flies_on) {
+            (Class::Crashed, crash.clone())
         } else if self.motors_on {
             (Class::KeptOn, "the motors were on at the end".into())
         } else if let Some(Intervention { alert, height_m, .. }) = stopped {
