@@ -78,7 +78,8 @@ pub struct VehicleConfig {
     pub corrections: Corrections,
     /// May packets that authenticate nobody fly it?
     pub accept_unauthenticated: bool,
-    /// Protections stop no motors in the air: a simulated flight, to find out whether they were right to. No firmware has it.
+    /// Protections stop no motors in the air: a simulated flight, to find out whether they were
+    /// right to. No firmware has it.
     #[cfg(feature = "simulation")]
     #[serde(skip)]
     pub flies_on: bool,

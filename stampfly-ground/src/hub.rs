@@ -185,8 +185,8 @@ struct Shared {
     log: Mutex<Option<Arc<LogSource>>>,
     /// Who commands, as pages were told last.
     commander: Mutex<Value>,
-    /// Card and commander as a text, until one of them changes. To make it anew for each page takes a
-    /// megabyte for a moment, in every page's thread.
+    /// Card and commander as a text, until one of them changes. To make it anew for each page takes
+    /// a megabyte for a moment, in every page's thread.
     introduction: Mutex<Option<Arc<str>>>,
     /// Clients that have gone, and that the vehicle was not told of.
     gone: Mutex<Vec<Client>>,

@@ -54,13 +54,13 @@ impl Mode {
         }
     }
 
-    /// What protections have found, as the mode machine is told it: the alerts, and whether the motors were cut off.
+    /// Alerts, and whether the motors were cut off, for the mode machine.
     #[cfg(not(feature = "simulation"))]
     const fn protections(&self, alerts: Alerts, cut_off: bool) -> (Alerts, bool) {
         (alerts, cut_off)
     }
 
-    /// The same. In the air of a flight that is to fly on, nothing of what stops motors.
+    /// The same. In a flight that is to fly on they lack in the air all that stops motors.
     #[cfg(feature = "simulation")]
     fn protections(&self, alerts: Alerts, cut_off: bool) -> (Alerts, bool) {
         let masked = self.flies_on && is_airborne(self.last.phase);
@@ -87,7 +87,8 @@ impl Runnable for Mode {
         let pairing = Some(ends.pairing_request.get().wanted).filter(|_| ends.pairing_request.is_new());
         let pairing = pairing.filter(|wanted| *wanted != self.last.pairing && !self.last.armed);
         let button = button.or(pairing.map(|_| ButtonGesture::HoldPair));
-        // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on without them.
+        // Motors that were cut off stay so until the vehicle is disarmed, and it cannot fly on
+        // without them.
         let (alerts, cut_off) = self.protections(ends.system_alert.get().active, ends.cutoff_state.get().tripped);
         let input = ModeInput {
             alerts,

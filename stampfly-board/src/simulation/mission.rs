@@ -21,9 +21,10 @@
 //! flies on, `autotune` when its time is over, `land` when it stands
 //! and is disarmed. A place that cannot be reached is given up after [`LONGEST_LEG`].
 //!
-//! `mode` and `chop` are a pilot's: the mode switch is turned, the throttle stick is pulled to its lowest for so long and then
-//! caught. A program has neither, and passes over them. `flip` and `autotune` are a program's; a pilot in a mode that holds
-//! height has one at hand to turn over, and passes over `autotune`.
+//! `mode` and `chop` are a pilot's: the mode switch is turned, the throttle stick is pulled to its
+//! lowest for SECONDS, and then the pilot catches the vehicle. A program has neither, and passes
+//! over them. `flip` and `autotune` are a program's; a pilot in a mode that holds height has one at
+//! hand to turn over, and passes over `autotune`.
 
 use super::pilot;
 use crate::parameters;
@@ -133,9 +134,9 @@ pub const HOVER: &str = include_str!("../../missions/hover.mission");
 /// The shortest flight that has every usual moment at which a fault can begin: for campaigns.
 pub const SHORT: &str = "arm; takeoff 0.5; hover 2; goto 1 0 0.7; land";
 
-/// Missions for campaigns, each for a moment that does not come in others. A flip needs height and room above it, a chop some
-/// height to be caught in. The switch goes from a mode that holds height to a manual one, or the other way. The gain is one that
-/// changes in flight, a tenth more of it.
+/// Missions for campaigns, each for a moment that does not come in others. A flip needs height and
+/// room above it, a chop some height to be caught in. The switch goes from a mode that holds height
+/// to a manual one, or the other way. The gain is one that changes in flight, a tenth more of it.
 pub const OCCASIONS: &[&str] = &[
     "arm; takeoff 1.5; hover 2; flip left; hover 2; land",
     "arm; takeoff 1; hover 2; mode poshold; hover 3; land",
@@ -204,8 +205,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// The moments that come in a flight of this mission, by a program or by a pilot in a mode, when nothing goes wrong; in
-    /// their order.
+    /// The moments that come in a flight of this mission, by a program or by a pilot in a mode,
+    /// when nothing goes wrong; in their order.
     ///
     /// ```
     /// use stampfly_board::simulation::mission::Mission;

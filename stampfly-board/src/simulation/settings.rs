@@ -1,5 +1,5 @@
-//! The vehicle's parameters while it is on, in the hands of whoever flies it: a change is told as a topic, and taken by the
-//! flight loop as [`stampfly_flight::live`] says.
+//! The vehicle's parameters while it is on, for a simulated pilot, a program and a page: a change
+//! is published as a topic, and the flight loop takes it as [`stampfly_flight::live`] says.
 
 use crate::VehicleConfig;
 use crate::messages::ParameterChange;
@@ -22,7 +22,8 @@ pub struct Settings<'b> {
 }
 
 impl<'b> Settings<'b> {
-    /// Of a vehicle that was assembled with this configuration. Changes are told at this console, and wait there.
+    /// Of a vehicle that was assembled with this configuration. Changes are told at this console,
+    /// and wait there.
     pub(super) fn new(config: &VehicleConfig, console: ConsoleEnds<'b>, waiting: &'b Waiting) -> Self {
         Self { config: config.clone(), told: Told::new(config.clone()), console, waiting }
     }
@@ -30,7 +31,8 @@ impl<'b> Settings<'b> {
     /// Changes the parameter at this place of the table.
     ///
     /// # Errors
-    /// When the vehicle does not take the value, or cannot fly with it and the others. Nothing has changed then.
+    /// When the vehicle does not take the value, or cannot fly with it and the others. Nothing has
+    /// changed then.
     pub fn set(&mut self, now: Instant, index: usize, value: f32) -> Result<(), ParameterError> {
         let mut config = self.config.clone();
         set_alone(&mut config, index, value)?;

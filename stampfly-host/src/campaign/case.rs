@@ -2,12 +2,14 @@
 //!
 //! So a campaign is flown in parts, on any machines and in any order, without anybody who hands out work.
 //!
-//! The first flights walk through every *cell*: first without a fault, then every fault of the vehicle's table, with its usual
-//! value, at every moment, under a program's commands and then in every mode of a pilot. A moment that does not come in the
-//! shortest mission has a mission of its own. The others draw fault, size, moment, duration, mode, mission and surroundings from
-//! the flight's seed, and one in ten of them has no fault; with [`Plan::pairs`], half of those with a fault have two.
-//! With [`Plan::drawn`], all flights are of this kind.
-//! With [`Plan::only`], the cells are of these faults alone, and all flights walk through them, again and again with other seeds.
+//! The first flights walk through every *cell*: first without a fault, then every fault of the
+//! vehicle's table, with its usual value, at every moment, under a program's commands and then in
+//! every mode of a pilot. A moment that does not come in the shortest mission has a mission of its
+//! own. The others draw fault, size, moment, duration, mode, mission and surroundings from the
+//! flight's seed, and one in ten of them has no fault; with [`Plan::pairs`], half of those with a
+//! fault have two. With [`Plan::drawn`], all flights are of this kind. With [`Plan::only`], the
+//! cells are of these faults alone, and all flights walk through them, again and again with other
+//! seeds.
 
 use crate::vehicles::DEFAULT;
 use serde::{Deserialize, Serialize};
@@ -91,7 +93,7 @@ impl Cases {
     /// The flights of this campaign of this vehicle.
     ///
     /// # Errors
-    /// When one of [`Plan::only`] is no fault of the vehicle.
+    /// When one of [`Plan::only`] is not a fault of the vehicle.
     pub fn new<V: Vehicle>(plan: &Plan) -> Result<Self, SetupError> {
         let variety = V::VARIETY;
         // Every one of the vehicle's, or the one that all flights have.
@@ -119,8 +121,8 @@ impl Cases {
         Ok(cases)
     }
 
-    /// Lists the cells. Each round has every fault once, and the moments in turn: a campaign that is cut short has seen some of
-    /// all.
+    /// Lists the cells. Each round has every fault once, and the moments in turn: a campaign that
+    /// is cut short has seen some of all.
     fn walk(&mut self) {
         let modes = std::iter::once(None).chain(self.modes.iter().copied().map(Some));
         let of_modes: Vec<_> = modes.map(|mode| (mode, self.occasions(mode))).collect();
@@ -150,7 +152,8 @@ impl Cases {
         self.cells = cells;
     }
 
-    /// Every moment that comes in some mission in this mode, with the first mission in which it does.
+    /// Every moment that comes in some mission in this mode, with the first mission in which it
+    /// does.
     fn occasions(&self, mode: Option<&'static str>) -> Vec<(Moment, Option<&'static str>)> {
         let of_missions: Vec<_> =
             self.missions.iter().map(|mission| (*mission, self.comes(mode, *mission, 1))).collect();

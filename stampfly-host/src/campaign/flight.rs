@@ -40,7 +40,8 @@ struct Named {
     name: String,
 }
 
-/// Flies it. A flight that panics is one that failed. The motors' cut in the air, if there is one, [is judged](with_cut_judged).
+/// Flies it. A flight that panics is one that failed. The motors' cut in the air, if there is one,
+/// [is judged](with_cut_judged).
 ///
 /// # Errors
 /// When the vehicle has no such flight.
@@ -59,16 +60,16 @@ pub fn fly_case<V: Vehicle>(case: &Case) -> Result<Row, SetupError> {
     })
 }
 
-/// The row, with its cut judged: a flight whose motors a protection stopped in the air is flown on from there, and the end of
-/// that says whether the protection was right.
+/// The row, with its cut judged: a flight whose motors a protection stopped in the air is flown on
+/// from there, and the end of that says whether the protection was right.
 #[must_use]
 pub fn with_cut_judged<V: Vehicle>(row: Row, case: &Case) -> Row {
     let flown_on = row.cut_by.as_ref().and_then(|_| fly_on::<V>(case));
     judged(row, flown_on)
 }
 
-/// How the flight ends that flies on where a protection stops the motors in the air. `None` when the vehicle does not offer it,
-/// or flies so already.
+/// How the flight ends that flies on where a protection stops the motors in the air. `None` when
+/// the vehicle does not offer it, or flies so already.
 fn fly_on<V: Vehicle>(case: &Case) -> Option<String> {
     let options = Options { flies_on: true, ..case.options.clone() };
     let setup = V::setup(&options, case.seed).ok().filter(|_| !case.options.flies_on)?;

@@ -1,4 +1,5 @@
-//! How often something happened, and how well that is known: a share with its interval of confidence.
+//! How often something happened, and how well that is known: a share with its interval of
+//! confidence.
 
 use serde::Serialize;
 use std::fmt;
@@ -15,9 +16,9 @@ const QUANTILE: f64 = 1.959_963_984_540_054;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rate {
-    /// In so many it happened.
+    /// Flights in which it happened.
     pub count: usize,
-    /// Of so many.
+    /// Flights in all.
     pub of: usize,
 }
 
@@ -34,9 +35,10 @@ impl Rate {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
     }
 
-    /// Between which shares the true one is with 95 % confidence: Wilson's score interval, which holds for rare events and for
-    /// none at all (E. B. Wilson, "Probable inference, the law of succession, and statistical inference", Journal of the American
-    /// Statistical Association 22, 1927). Of nothing it may be anything.
+    /// Between which shares the true one is with 95 % confidence: Wilson's score interval, which
+    /// holds for rare events and for none at all (E. B. Wilson, "Probable inference, the law of
+    /// succession, and statistical inference", Journal of the American Statistical Association 22,
+    /// 1927). Of nothing it may be anything.
     #[must_use]
     pub fn interval(&self) -> [f64; 2] {
         let Some(share) = self.share() else { return [0.0, 1.0] };
@@ -77,8 +79,8 @@ impl Serialize for Rate {
 mod tests {
     use super::*;
 
-    /// Table I, method 3, of R. G. Newcombe, "Two-sided confidence intervals for the single proportion: comparison of seven
-    /// methods", Statistics in Medicine 17, 1998.
+    /// Table I, method 3, of R. G. Newcombe, "Two-sided confidence intervals for the single
+    /// proportion: comparison of seven methods", Statistics in Medicine 17, 1998.
     #[test]
     fn intervals_are_those_of_the_textbook() {
         let near = |rate: Rate, [low, high]: [f64; 2]| {

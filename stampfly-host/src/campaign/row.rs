@@ -175,7 +175,8 @@ row! {
 pub const PASSED: &str = "passed";
 /// The verdict of a flight whose fault changed nothing.
 pub const IDLE: &str = "idle";
-/// The word in the verdict of a flight whose motors were stopped in the air, and that would have ended acceptably without.
+/// The word in the verdict of a flight whose motors were stopped in the air, and that would have
+/// ended acceptably without.
 pub const NEEDLESS_CUT: &str = "needless-cut";
 /// The verdict of a flight of a vehicle that does not say how its flights end.
 pub const UNJUDGED: &str = "unjudged";
@@ -207,8 +208,8 @@ impl Row {
         self.faults.is_empty()
     }
 
-    /// Were the motors stopped in the air, and would the flight have ended acceptably if they had not been? `None` where they
-    /// were not, or where the vehicle does not fly on to find out.
+    /// Were the motors stopped in the air, and would the flight have ended acceptably if they had
+    /// not been? `None` where they were not, or where the vehicle does not fly on to find out.
     #[must_use]
     pub fn cut_was_needless(&self) -> Option<bool> {
         self.flown_on.as_ref()?;
@@ -220,8 +221,8 @@ impl Row {
         self.violations.split_whitespace().filter(|name| *name != FAULT_ACTED)
     }
 
-    /// Did it fail as this one did: with the same end if that was wrong, with one of its violations if it had any, with a needless cut
-    /// if it had one?
+    /// Did it fail as this one did: with the same end if that was wrong, with one of its violations
+    /// if it had any, with a needless cut if it had one?
     #[must_use]
     pub fn failed_like(&self, other: &Self) -> bool {
         let same_end = other.as_expected || (!self.as_expected && self.outcome == other.outcome);

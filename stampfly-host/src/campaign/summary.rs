@@ -1,5 +1,5 @@
-//! What the flights of a fault campaign say together: how many passed, every cell of fault × moment, every kind of failure, and
-//! whether protections were right to stop motors.
+//! What the flights of a fault campaign say together: how many passed, every cell of fault ×
+//! moment, every kind of failure, and whether protections were right to stop motors.
 
 use super::rate::Rate;
 use super::row::{IDLE, PANICKED, Row};
@@ -192,7 +192,8 @@ impl Summary {
         summary
     }
 
-    /// By fault, or both with `+` between them, how many cuts were needless, of how many; of those that had one.
+    /// By fault, or both with `+` between them, how many cuts were needless, of how many; of those
+    /// that had one.
     #[must_use]
     pub fn needless_by_fault(&self) -> BTreeMap<String, Rate> {
         let mut all: BTreeMap<String, Rate> = BTreeMap::new();
@@ -206,7 +207,8 @@ impl Summary {
         all
     }
 
-    /// The cells of fault × moment as CSV, every fault of the table and every moment in order; first the flights without a fault.
+    /// The cells of fault × moment as CSV, every fault of the table and every moment in order;
+    /// first the flights without a fault.
     #[must_use]
     pub fn csv(&self, faults: &[FaultKind]) -> String {
         let head =

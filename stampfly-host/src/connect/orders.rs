@@ -15,8 +15,8 @@ pub(super) struct Orders {
     commands: Commands,
     /// Numbers of commands and of the questions that they are.
     asked: VecDeque<(u32, u16)>,
-    /// The same of commands that are not said any more: the vehicle says whether one was done when that is seen, or a second and
-    /// a half later why not.
+    /// The same of commands that are not said any more: the vehicle says whether one was done when
+    /// that is seen, or a second and a half later why not.
     over: VecDeque<(u32, u16)>,
     /// The number of the kill that is being said.
     kill: Option<u32>,

@@ -50,8 +50,8 @@ impl FileNames {
     }
 }
 
-/// Writes a topic as a table. Its header is one line, whatever names the log's fields have: those with
-/// commas or quotes in them are quoted as RFC 4180 says, and control characters are shown as
+/// Writes a topic as a table. Its header is one line, whatever names the log's fields have: those
+/// with commas or quotes in them are quoted as RFC 4180 says, and control characters are shown as
 /// [`plain`] shows them.
 ///
 /// ```

@@ -76,8 +76,8 @@ pub(super) struct Connections {
 #[derive(Debug)]
 struct Queue {
     bytes: Outbox,
-    /// The how many-th it is, and whether it has shown that it speaks the port's language; where the
-    /// key is asked for, that it has the key.
+    /// The how many-th it is, and whether it has shown that it speaks the port's language; where
+    /// the key is asked for, that it has the key.
     number: u64,
     is_shown: bool,
     /// Is what finds no room lost? A serial line stays, whether or not a program reads there.

@@ -1,4 +1,5 @@
-//! What waits until a connection takes it: pieces of bytes in their order, of bounded size together.
+//! What waits until a connection takes it: pieces of bytes in their order, of bounded size
+//! together.
 //!
 //! The bound is one of bytes, since a line that was held up brings what a vehicle has said
 //! meanwhile at once: a thousand short frames, for a program that reads as fast as any.

@@ -1,4 +1,5 @@
-//! Motors that a protection stops in the air: the same flight, flown on, says whether it was right to.
+//! Motors that a protection stops in the air: the same flight, flown on, says whether it was right
+//! to.
 
 use stampfly_board::simulation::StampFly;
 use stampfly_host::campaign::case::Case;
@@ -72,7 +73,7 @@ fn a_flight_that_flies_on_has_the_alert_and_replays() {
     assert_eq!(cut.judgement.outcome, "cut", "{:?}", cut.judgement);
 }
 
-/// The mask is an option of a simulated flight, and no parameter that somebody could set on a vehicle.
+/// The mask is an option of a simulated flight, and not a parameter of a vehicle.
 #[test]
 fn nothing_but_the_simulators_option_masks_a_protection() {
     let refused = |words: &[&str]| {

@@ -1,5 +1,5 @@
-//! What a page is told of a command is the vehicle's own verdict, on every path: at the page of
-//! `serve`, behind a cable and by radio.
+//! A page receives the vehicle's own verdict of each command, on every path: at the page of
+//! `serve`, over a cable and by radio.
 
 use crate::connect::{alive, ask, connect, is_up, next, page};
 use crate::connect_radio::key;

@@ -1,5 +1,5 @@
-//! A vehicle that cannot lift itself: too heavy, or its battery too weak. Motors at their limit drag it over the floor, so it
-//! stops them.
+//! A vehicle that cannot lift itself: too heavy, or its battery too weak. Motors at their limit
+//! drag it over the floor, so it stops them.
 
 use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::{Outcome, PLANT, StampFly};
@@ -12,16 +12,18 @@ use stampfly_sim::vehicle::{Options, Vehicle, Verdict as _, Witness};
 use stampfly_types::messages::{Alerts, ControlOutput, MotorOutput, SystemAlert};
 use stampfly_types::{Duration, Instant, Vec3};
 
-/// Above the weight of the vehicle as it was designed, for which its controller is made: 1.1 of it. A vehicle that weighs what
-/// it should rises by 0.5 m within a second of that.
+/// Above the weight of the vehicle as it was designed, for which its controller is made: 1.1 of it.
+/// A vehicle that weighs what it should rises by 0.5 m within a second of that.
 const ASKED: f32 = 1.1;
-/// The thrust is at its ceiling: some of it is asked for and not there. Less than this is what steering takes for a moment.
+/// The thrust is at its ceiling: some of it is asked for and not there. Less than this is what
+/// steering takes for a moment.
 const MISSING: f32 = 0.05;
 
 /// What is asked of the motors, and what comes of it.
 #[derive(Default)]
 struct Lift {
-    /// When more than the weight, or more than there is, was asked for first, and when the motors stopped after that.
+    /// When more than the weight, or more than there is, was asked for first, and when the motors
+    /// stopped after that.
     asked: Option<Instant>,
     stopped: Option<Instant>,
     /// They turned again.

@@ -1,5 +1,5 @@
-//! The moments at which faults begin: each comes in the flights that are said to have it and in no others, those flights end well
-//! without a fault, and one that never comes is said aloud.
+//! The moments at which faults begin: each comes in the flights that are said to have it and in no
+//! others, those flights end well without a fault, and one that never comes is said aloud.
 
 use crate::thorough::thorough;
 use serde_json::Value;
@@ -44,7 +44,8 @@ fn each_moment_comes_where_it_is_said_to_come_and_nowhere_else() {
     }
 }
 
-/// The mission's own steps are no failure: a fault that is to change nothing must not look as if it did.
+/// The mission's own steps are no failure: a fault that is to change nothing must not look as if it
+/// did.
 #[test]
 fn flights_with_these_moments_end_well_without_a_fault() {
     for mission in OCCASIONS {
@@ -77,7 +78,8 @@ fn a_fault_that_may_change_nothing_may_change_nothing_at_these_moments_either() 
     }
 }
 
-/// A gyro that is off while the vehicle calibrates, and right afterwards, is off the other way in flight.
+/// A gyro that is off while the vehicle calibrates, and right afterwards, is off the other way in
+/// flight.
 #[test]
 fn a_fault_while_it_calibrates_is_one_of_the_calibration() {
     let still = flown(SHORT, None, 1, &["gyro-bias=0.02@calibration+60".into()]);

@@ -197,8 +197,8 @@ impl Witness<Runnables> for Heard {
     }
 }
 
-/// North and east, m, clockwise, rad, and up, m: how far it has gone when the sticks were so for so many seconds, and at rest for
-/// half a second.
+/// North and east, m, clockwise, rad, and up, m: how far it has gone when the sticks were so for so
+/// many seconds, and at rest for half a second.
 fn moved(mode: &str, hover: f32, sticks: [f32; 4], seconds: f32) -> [f32; 4] {
     let row =
         |t: f32, [throttle, roll, pitch, yaw]: [f32; 4]| format!("{t},{throttle},{roll},{pitch},{yaw},{mode},1,0");
@@ -215,11 +215,13 @@ fn moved(mode: &str, hover: f32, sticks: [f32; 4], seconds: f32) -> [f32; 4] {
     [north, east, turned, -down]
 }
 
-/// The signs that `docs/sticks.md` promises, from the file to what the vehicle does while it looks north.
+/// The signs that `docs/sticks.md` promises, from the file to what the vehicle does while it looks
+/// north.
 #[test]
 fn sticks_move_the_vehicle_the_way_the_page_says() {
-    // The throttle with which it stays at its height; in a manual mode about that. How far the others go there, and for how long: a
-    // lean that is kept carries it farther, and in ACRO the stick turns it further and further.
+    // The throttle with which it stays at its height; in a manual mode about that. How far the
+    // others go there, and for how long: a lean that is kept carries it farther, and in ACRO the
+    // stick turns it further and further.
     for (mode, hover, stick, seconds) in [
         ("poshold", 0.0, 0.5, 1.5),
         ("althold", 0.0, 0.5, 0.5),

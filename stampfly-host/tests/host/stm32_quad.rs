@@ -25,8 +25,9 @@ fn a_flight_is_replayed_bit_for_bit() {
 #[test]
 fn a_campaign_of_faults_judges_its_flights_and_repeats_them() {
     let folder = folder("stm32_quad", "faults");
-    // A gyro that is off by 6 deg/s, or an accelerometer by 1 m/s², leans the vehicle when it lands. Under a ceiling its
-    // pilot goes on climbing. A motor that cannot be switched off turns it over on the ground.
+    // A gyro that is off by 6 deg/s, or an accelerometer by 1 m/s², leans the vehicle when it
+    // lands. Under a ceiling its pilot goes on climbing. A motor that cannot be switched off turns
+    // it over on the ground.
     campaign_of_faults(&folder, "stm32-quad", thorough((6, 1), (42, 7)));
 }
 

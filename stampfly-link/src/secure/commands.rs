@@ -1,9 +1,13 @@
 //! Commands that are said until the vehicle acknowledges them: a station's way over a link that loses frames.
 //!
-//! One after the other, in the order they were given. The vehicle takes each once, however often it hears it, so a second way-point is never the first one said
-//! again. A kill goes before all others and ends them; a landing and a disarming go before all but a kill, and end what flies on. For commands; sticks are newer every time, and to write a parameter twice is to write it once. No
-//! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station), and hand back what is acknowledged. A vehicle remembers the
-//! newest number alone: it may take a command twice that is said again after it has restarted, or after another station with its key has commanded.
+//! One after the other, in the order they were given. The vehicle takes each once, however often it
+//! hears it, so a second way-point is never the first one said again. A kill goes before all others
+//! and ends them; a landing and a disarming go before all but a kill, and end what flies on. For
+//! commands; sticks are newer every time, and to write a parameter twice is to write it once. No
+//! radio and no clock: seal what [`Commands::next`] returns with the [`Station`](super::Station),
+//! and hand back what is acknowledged. A vehicle remembers the newest number alone: it may take a
+//! command twice that is said again after it has restarted, or after another station with its key
+//! has commanded.
 
 use super::payload::Payload;
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
@@ -34,7 +38,8 @@ impl Said {
         matches!(self.command.kind, GuidedKind::Kill)
     }
 
-    /// Does it end a flight? It waits for no command before it: one that the vehicle does not do is said for a second.
+    /// Does it end a flight? It waits for no command before it: one that the vehicle does not do is
+    /// said for a second.
     const fn ends_a_flight(&self) -> bool {
         matches!(self.command.kind, GuidedKind::Kill | GuidedKind::Land | GuidedKind::Disarm)
     }
@@ -113,7 +118,8 @@ impl Commands {
         true
     }
 
-    /// Ends the commands that fly on, and frees the place behind those that end a flight. `None` when these have every place.
+    /// Ends the commands that fly on, and frees the place behind those that end a flight. `None`
+    /// when these have every place.
     fn make_way(&mut self, now: Instant) -> Option<&mut Option<Said>> {
         self.waiting.iter_mut().flatten().filter(|said| !said.ends_a_flight()).for_each(|said| said.until = now);
         let before = self.waiting.iter().take_while(|place| place.is_some_and(|said| said.ends_a_flight())).count();

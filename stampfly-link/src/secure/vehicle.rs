@@ -105,7 +105,8 @@ pub struct Held {
 }
 
 impl Held {
-    /// The counter of the frame, or the number of its command: what an acknowledgement or a refusal of it names.
+    /// The counter of the frame, or the number of its command: what an acknowledgement or a refusal
+    /// of it names.
     #[must_use]
     pub const fn counter(&self) -> u32 {
         self.counter
@@ -344,8 +345,9 @@ impl Vehicle {
         self.note(acknowledged);
     }
 
-    /// Notes that a command was taken whose effect is not seen yet. A [numbered](Payload::Numbered) one is not returned again
-    /// and not acknowledged, until [`Vehicle::settle`] says what became of it. Returns what to call it there.
+    /// Notes that a command was taken whose effect is not seen yet. A [numbered](Payload::Numbered)
+    /// one is not returned again and not acknowledged, until [`Vehicle::settle`] says what became
+    /// of it. Returns what to call it there.
     pub fn hold(&mut self, received: &Received<'_>) -> Held {
         let Payload::Numbered { number, .. } = received.payload else {
             return Held { counter: received.counter, is_number: false };
@@ -354,8 +356,8 @@ impl Vehicle {
         Held { counter: number, is_number: true }
     }
 
-    /// What became of a command that was held. One that was done is to be acknowledged. One that was not is returned again if it is
-    /// said again: the caller says why, and does not do it.
+    /// What became of a command that was held. One that was done is to be acknowledged. One that
+    /// was not is returned again if it is said again: the caller says why, and does not do it.
     pub fn settle(&mut self, held: Held, is_done: bool) {
         let Held { counter, is_number } = held;
         if is_number && self.numbered == Some(counter) {

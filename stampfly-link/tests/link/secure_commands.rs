@@ -90,8 +90,9 @@ proptest! {
         prop_assert_eq!(&answered, &numbers[..4]);
         prop_assert!(pair.obeyed.len() >= pair.done.len());
         prop_assert_eq!(&pair.obeyed[..], &kinds[..pair.obeyed.len()]);
-        // Within its second a command and its acknowledgement have sixteen tries. Of 10 % losses four or more succeed
-        // in all but one of seven million seeds (binomial, 0.81 a try); of 30 % one seed in eighty has three at most.
+        // Within its second a command and its acknowledgement have sixteen tries. Of 10 % losses
+        // four or more succeed in all but one of seven million seeds (binomial, 0.81 a try); of 30
+        // % one seed in eighty has three at most.
         if loss <= 10 {
             prop_assert_eq!((pair.obeyed.len(), pair.done.len()), (4, 4));
         }

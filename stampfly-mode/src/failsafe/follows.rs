@@ -77,8 +77,9 @@ impl FollowsMonitor {
 }
 
 impl Axis {
-    /// The changes of the rate, less their means: what the torque makes, and what is measured. `turned`: of both since
-    /// the last step. So much of a change is kept, and so much of it goes into its mean.
+    /// The changes of the rate, less their means: what the torque makes, and what is measured.
+    /// `turned`: of both since the last step. So much of a change is kept, and so much of it goes
+    /// into its mean.
     fn change(&mut self, turned: [f32; 2], kept: f32, mean: f32) -> [f32; 2] {
         for (place, turned) in turned.into_iter().enumerate() {
             self.changes[place] = (self.changes[place] + turned) * kept;

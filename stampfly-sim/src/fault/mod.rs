@@ -145,7 +145,8 @@ impl FaultKind {
         Self { above: Some((size, expected)), ..self }
     }
 
-    /// The same, with a number that a campaign draws from sizes of this measure and range, for this reason.
+    /// The same, with a number that a campaign draws from sizes of this measure and range, for this
+    /// reason.
     #[must_use]
     pub const fn sized(self, measure: Measure, range: [f64; 2], reason: &'static str) -> Self {
         Self { sizes: Some(Sizes { measure, range, reason }), ..self }

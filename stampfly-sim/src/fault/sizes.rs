@@ -1,8 +1,9 @@
 //! How large a fault is: the range that is plausible, with the reason, and the draw of a campaign.
 //!
-//! What a fault is drawn by is its *size*, how far its number is from the one with which it changes nothing. Sizes are drawn
-//! evenly in their logarithm: one that is just felt is as likely as a gross one, where an even draw over the range would
-//! hardly ever give the small ones, which are the hard ones to find. Use it for faults with a number; others have no size.
+//! What a fault is drawn by is its *size*, how far its number is from the one with which it changes
+//! nothing. Sizes are drawn evenly in their logarithm: one that is just felt is as likely as a
+//! gross one, where an even draw over the range would hardly ever give the small ones, which are
+//! the hard ones to find. Use it for faults with a number; others have no size.
 
 use crate::noise::Noise;
 use core::fmt;
@@ -12,7 +13,8 @@ use core::fmt;
 pub struct Sizes {
     /// What a size is.
     pub measure: Measure,
-    /// Smallest and largest, both above zero, in the fault's unit; of [`Measure::Times`] both above one.
+    /// Smallest and largest, both above zero, in the fault's unit; of [`Measure::Times`] both above
+    /// one.
     pub range: [f64; 2],
     /// Why these are plausible.
     pub reason: &'static str,
@@ -97,7 +99,8 @@ mod tests {
         Sizes { measure, range, reason: "a test" }
     }
 
-    /// The largest distance between the shares of sizes up to each of them and those of an even draw of the logarithm.
+    /// The largest distance between the shares of sizes up to each of them and those of an even
+    /// draw of the logarithm.
     fn distance(sizes: &Sizes, seed: u64) -> f64 {
         let [low, high] = sizes.range.map(libm::log);
         let mut noise = Noise::new(seed, 1);

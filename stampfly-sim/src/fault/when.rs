@@ -5,9 +5,9 @@ use stampfly_types::Duration;
 
 /// A moment of a flight. The vehicle's surroundings say when it has come.
 ///
-/// [`USUAL`](Self::USUAL) ones come in every flight that takes off, flies to a place and lands. The others come where somebody
-/// does what they are about, and where the vehicle has it: a vehicle says which come in a flight
-/// ([`Vehicle::moments`](crate::vehicle::Vehicle::moments)).
+/// [`USUAL`](Self::USUAL) ones come in every flight that takes off, flies to a place and lands.
+/// Another one comes when the pilot or the program does the thing that it is named after.
+/// [`Vehicle::moments`](crate::vehicle::Vehicle::moments) lists those of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
     /// The still calibration after power-on begins.

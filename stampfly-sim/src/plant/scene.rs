@@ -151,7 +151,8 @@ impl Scene {
         let meets = |level: f64| (level - place.z) / beam.z;
         let Some((beyond, drop)) = &self.edge else { return meets(0.0) };
         let (upper, lower) = (drop.min(0.0), drop.max(0.0));
-        // A beam that passes over an edge meets the lower floor, and so does one from under the upper one.
+        // A beam that passes over an edge meets the lower floor, and so does one from under the
+        // upper one.
         let is_beyond = beyond.depth(&(place + beam * meets(upper))) > 0.0;
         let on_upper = is_beyond == (*drop < 0.0) && place.z <= upper + OVERHANG;
         meets(if on_upper { upper } else { lower })
@@ -249,8 +250,8 @@ mod tests {
             let down = |x: f64, beam: Vector3<f64>| scene.distance(&Vector3::new(x, 0.0, -1.0), &beam) * beam.z;
             let [here, there] = [down(-2.0, lean(0.0)), down(2.0, lean(0.0))];
             assert!((here - 1.0).abs() < 1e-9 && (there - 1.0 - drop).abs() < 1e-9, "{drop} m: {here}, {there}");
-            // One that leans, just beyond the edge where it has come down to the upper floor, and just before it. The face of a step is not
-            // seen.
+            // One that leans, just beyond the edge where it has come down to the upper floor, and
+            // just before it. The face of a step is not seen.
             let upper = 1.0 + drop.min(0.0);
             let [beyond, before] = [0.01, -0.01].map(|past| down(past - 0.5 * upper, lean(0.5)));
             assert!((beyond - 1.0 - drop).abs() < 1e-9 && (before - 1.0).abs() < 1e-9, "{drop} m: {beyond}, {before}");

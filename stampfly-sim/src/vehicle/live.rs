@@ -209,8 +209,8 @@ pub trait Ports: fmt::Debug + Send + Sync {
     /// no program does. Nothing by default.
     fn tell_commander(&self, _who: &str, _page: Option<u32>) {}
 
-    /// This program has signed with the key that its port asks for: others make room for it. Nothing
-    /// by default.
+    /// This program has signed with the key that its port asks for: others make room for it.
+    /// Nothing by default.
     fn believe(&self, _client: &Client) {}
 
     /// Do only programs on this machine reach that port?

@@ -265,7 +265,8 @@ pub struct Options {
     /// Fly what is in a stick file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sticks: Option<StickOptions>,
-    /// Fly on where a protection stops the motors in the air: to find out whether that was right. A simulator's option alone.
+    /// Fly on where a protection stops the motors in the air: to find out whether that was right. A
+    /// simulator's option alone.
     #[serde(skip_serializing_if = "core::ops::Not::not")]
     pub flies_on: bool,
     /// Fly what other programs ask for; not written down, because it is not repeatable.
@@ -354,9 +355,11 @@ pub struct Setting {
 pub struct Variety {
     /// Flight modes of a pilot, as [`Options::pilot`] takes them.
     pub modes: &'static [&'static str],
-    /// Missions, as [`Options::mission`] takes them; the first is short and has every usual moment at which a fault can begin.
+    /// Missions, as [`Options::mission`] takes them; the first is short and has every usual moment
+    /// at which a fault can begin.
     pub missions: &'static [&'static str],
-    /// Missions for the moments that do not come in those, in the order in which they are looked through for one.
+    /// Missions for the moments that do not come in those, in the order in which they are looked
+    /// through for one.
     pub occasions: &'static [&'static str],
     /// Faults that begin at a time begin within these, s since power-on: from before the vehicle is armed until the shortest mission is about to land.
     pub times: [u16; 2],
@@ -492,7 +495,8 @@ pub trait Vehicle: 'static {
         None
     }
 
-    /// The moments that come in a flight of these options when nothing goes wrong, in their order. By default the usual ones.
+    /// The moments that come in a flight of these options when nothing goes wrong, in their order.
+    /// By default the usual ones.
     fn moments(_options: &Options, _seed: u64) -> Vec<Moment> {
         Moment::USUAL.to_vec()
     }

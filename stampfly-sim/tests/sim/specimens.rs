@@ -1,7 +1,8 @@
-//! How far specimens lie apart: what the harsh world draws, against the figures it is drawn from, and what the sensors then
-//! measure, against what is true.
+//! How far specimens lie apart: what the harsh world draws, against the figures it is drawn from,
+//! and what the sensors then measure, against what is true.
 //!
-//! Seeds are fixed, so these tests always see the same specimens; the bounds are what as many others would keep, too.
+//! Seeds are fixed, so these tests always see the same specimens; the bounds are what as many
+//! others would keep, too.
 
 use nalgebra::Vector3;
 use stampfly_drivers::{Imu, OpticalFlow, RangeFinder};
@@ -72,8 +73,9 @@ fn independent(what: &str, pairs: &[[f64; 2]]) {
     assert!(correlation.abs() < 4.0 / (pairs.len() as f64).sqrt(), "{what}: correlated, {correlation}");
 }
 
-/// Published StampFlys weigh 35 to 37 g, which is 2.8 % to either side; two families of measurements of its propellers lie 25 %
-/// apart, which is 12.5 %; the rotors' lag is 14 to 30 ms, which is 36 %.
+/// Published StampFlys weigh 35 to 37 g, which is 2.8 % to either side; two families of
+/// measurements of its propellers lie 25 % apart, which is 12.5 %; the rotors' lag is 14 to 30 ms,
+/// which is 36 %.
 #[test]
 fn mass_thrust_and_lag_lie_as_far_apart_as_what_is_published() {
     let conditions = harsh(1);
@@ -108,7 +110,8 @@ fn every_vehicle_is_drawn_evenly_and_its_numbers_independently() {
             independent(&format!("{what} and {other}"), &pairs);
         }
     }
-    // A flat body: what is farther from x or y is farther from z, and no moment is larger than the sum of the others.
+    // A flat body: what is farther from x or y is farther from z, and no moment is larger than the
+    // sum of the others.
     for one in &drawn {
         let [x, y, z] = [one.inertia_x, one.inertia_y, one.inertia_z];
         let share = 0.5 * (x / plant.inertia_x + y / plant.inertia_y);
@@ -154,7 +157,8 @@ fn flow_sensors_count_more_or_less_by_their_scale() {
     assert!(apart < 2.0 * FLOW_ERROR, "one sensor has one scale: {apart}");
 }
 
-/// The axes of one sensor: 0.943 and 1.015 were found, which is 3.6 % to either side of their middle.
+/// The axes of one sensor: 0.943 and 1.015 were found, which is 3.6 % to either side of their
+/// middle.
 #[test]
 fn the_axes_of_a_flow_sensor_differ_by_their_own_scale() {
     let bound = harsh(1).flow_axis_scale;
@@ -167,10 +171,12 @@ fn the_axes_of_a_flow_sensor_differ_by_their_own_scale() {
     independent("x and y", &shares);
 }
 
-/// The sum of what has been read falls behind by the flow times the delay, on the mean over all phases of picture and read.
+/// The sum of what has been read falls behind by the flow times the delay, on the mean over all
+/// phases of picture and read.
 ///
-/// At 25 rad/s, so that the noise of 70 pictures, 0.37 counts each and another one in each flight, is 0.4 ms at the end and half of it on
-/// the mean; of 20 flights, 0.05 ms, four times that, and a hundredth of a picture for phases that are not quite even.
+/// At 25 rad/s, so that the noise of 70 pictures, 0.37 counts each and another one in each flight,
+/// is 0.4 ms at the end and half of it on the mean; of 20 flights, 0.05 ms, four times that, and a
+/// hundredth of a picture for phases that are not quite even.
 #[test]
 fn flow_is_as_late_as_its_delay() {
     let sums = |seed: u64, flow_delay: f64| {
@@ -209,7 +215,8 @@ fn the_delay_of_flow_is_about_that_of_a_picture() {
 fn inertial_sensors_measure_more_or_less_by_their_scale() {
     let bound = harsh(1).imu_scale;
     assert_eq!(bound, 0.01);
-    // The axis by which the vehicle is turned, and what the gyroscope then measures less its offset.
+    // The axis by which the vehicle is turned, and what the gyroscope then measures less its
+    // offset.
     let turned = |seed: u64, imu_scale: f64, axis: usize| {
         let rate = Vector3::from_fn(|row, _| if row == axis { 10.0 } else { 0.0 });
         let conditions = Conditions { imu_scale, ..Conditions::GENTLE };
@@ -265,11 +272,13 @@ fn range_errors(seed: u64, conditions: &Conditions) -> [f64; 2] {
     [scale - 1.0, near - 0.4 * scale]
 }
 
-/// Noise of 1.2 mm near and 4 mm far, over √40: 0.7 mm, four times that over the 1.6 m between, and the same in the offset.
+/// Noise of 1.2 mm near and 4 mm far, over √40: 0.7 mm, four times that over the 1.6 m between, and
+/// the same in the offset.
 const SCALE_ERROR: f64 = 4.0 * 0.0007 / 1.6;
 const OFFSET_ERROR: f64 = 4.0 * 0.0005;
 
-/// The data sheets' ranging error is 20 to 25 mm at 0.3 to 0.4 m: no specimen is farther off there, and some are as far.
+/// The data sheets' ranging error is 20 to 25 mm at 0.3 to 0.4 m: no specimen is farther off there,
+/// and some are as far.
 #[test]
 fn range_finders_err_by_scale_and_offset_as_the_data_sheets_say() {
     let Conditions { range_scale, range_offset, .. } = harsh(1);
@@ -286,8 +295,8 @@ fn range_finders_err_by_scale_and_offset_as_the_data_sheets_say() {
     assert!(scale.abs() < SCALE_ERROR && offset.abs() < OFFSET_ERROR, "{scale}, {offset} m");
 }
 
-/// A flight record has 2.5 Pa in a hover, and the sign on another specimen is unknown: 0.3 m either way, and 0.6 m with what the
-/// floor adds. A metre of air weighs 11.77 Pa.
+/// A flight record has 2.5 Pa in a hover, and the sign on another specimen is unknown: 0.3 m either
+/// way, and 0.6 m with what the floor adds. A metre of air weighs 11.77 Pa.
 #[test]
 fn propellers_press_or_suck_as_much_as_was_recorded() {
     let conditions: Vec<_> = (0..500).map(harsh).collect();

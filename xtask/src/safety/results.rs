@@ -1,5 +1,5 @@
-//! What campaigns found, `xtask/safety.json`: each campaign with its command line and the part of its report that documents
-//! and checks need. Written by `cargo xtask safety`.
+//! What campaigns found, `xtask/safety.json`: each campaign with its command line and the part of
+//! its report that documents and checks need. Written by `cargo xtask safety`.
 
 use crate::repository::{Failure, Repository, json};
 use serde_json::{Map, Value, json};
@@ -8,7 +8,8 @@ use std::path::Path;
 
 /// Its path in the repository.
 pub const FILE: &str = "xtask/safety.json";
-/// What flights of the same flight stack have in common: it is recorded again when they are meant to change.
+/// What flights of the same flight stack have in common: it is recorded again when they are meant
+/// to change.
 const GOLDEN: &str = "stampfly-board/golden/flight.bin";
 
 /// What is kept of a report.
@@ -105,7 +106,8 @@ impl Results {
     }
 }
 
-/// Of stick files in their modes, those in which a vehicle did something by itself while it was sound.
+/// Of stick files in their modes, those in which a vehicle did something by itself while it was
+/// sound.
 fn hindered(cells: &[Value]) -> Value {
     let is_hindered = |cell: &&Value| cell["while_sound"].as_object().is_some_and(|counts| !counts.is_empty());
     let short = |cell: &Value| {

@@ -1,14 +1,14 @@
-//! `faults` and `campaign`: every flight with a fault ends as the fault allows, holds every invariant, and stops its motors in the
-//! air only where flying on would have ended badly.
+//! `faults` and `campaign`: every flight with a fault ends as the fault allows, holds every
+//! invariant, and stops its motors in the air only where flying on would have ended badly.
 //!
 //! | step | flights |
 //! |---|---|
 //! | `faults` | 200: flights without a fault, and every fault of the table at some moments of a flight under a program's commands |
 //! | `campaign` | 3,000: every fault at every moment, under commands and in every mode of a pilot, and some at random |
 //!
-//! No invariant may be violated. Some flights are known to fail: those that `cargo xtask safety` found in the first campaign of
-//! `xtask/safety.json`, by fault and by whether the motors were stopped needlessly. Flights are the same on every machine, so the counts
-//! are exact.
+//! No invariant may be violated. Some flights are known to fail: those that `cargo xtask safety`
+//! found in the first campaign of `xtask/safety.json`, by fault and by whether the motors were
+//! stopped needlessly. Flights are the same on every machine, so the counts are exact.
 
 use super::program::{built, released};
 use super::safety::{FIRST, FLIGHTS, report};

@@ -45,8 +45,8 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
 }
 
-/// A clone of the last commit. One that is there from before is brought up to it: files that are as they were keep their
-/// times, and nothing is built for them again.
+/// A clone of the last commit. One that is there from before is brought up to it: files that are as
+/// they were keep their times, and nothing is built for them again.
 fn cloned(repository: &Repository) -> Result<PathBuf, Failure> {
     let clone = repository.target(FOLDER).join("clone");
     let brought_up = [&["fetch", "--quiet", "origin", "HEAD"][..], &["reset", "--quiet", "--hard", "FETCH_HEAD"]];

@@ -1,11 +1,14 @@
-//! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`, and prints the tables.
+//! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`,
+//! and prints the tables.
 //!
-//! Takes an hour on two cores, so it is in no lane; the document says with which commit it was made. Names of campaigns on the
-//! command line fly these alone. The recordings of pilots need the folder of recorded flights.
+//! Takes an hour on two cores, so it is in no lane; the document says with which commit it was
+//! made. Names of campaigns on the command line fly these alone. The recordings of pilots need the
+//! folder of recorded flights.
 //!
-//! What keeps the tables up to date: [`docs`](super::docs) compares the document with the file, and says when the golden flight
-//! has changed since; [`campaign`](super::campaign) flies the first campaign every night, and fails when another flight of it
-//! ends wrong than the file has, or one ends well.
+//! What keeps the tables up to date: [`docs`](super::docs) compares the document with the file, and
+//! says when the golden flight has changed since; [`campaign`](super::campaign) flies the first
+//! campaign every night, and fails when another flight of it ends wrong than the file has, or one
+//! ends well.
 
 use super::program::released;
 use crate::arguments::Arguments;

@@ -38,8 +38,8 @@ const fn on(name: &'static str) -> FaultKind {
     )
 }
 
-/// Every fault. Units are SI; axes are the body's. The sizes that are plausible come from data sheets, recordings and physics,
-/// and not from what this flight stack finds.
+/// Every fault. Units are SI; axes are the body's. The sizes that are plausible come from data
+/// sheets, recordings and physics, and not from what this flight stack finds.
 pub const FAULTS: &[FaultKind] =
     &[
         plain("imu-silent", Cut, "No inertial sample arrives."),
@@ -51,7 +51,8 @@ pub const FAULTS: &[FaultKind] =
             [1.02, 2.0],
             "a few times the sensitivity's tolerance to a range register that is one step off",
         ),
-        // On its last rates it flies for some 50 ms: at 3 rad/s, which a gust makes, it leans by 9° more than it knows. Those are 20 samples.
+        // On its last rates it flies for some 50 ms, 20 samples: at 3 rad/s, which a gust makes, it
+        // leans by 9° more than it knows.
         number(
             "imu-garbage",
             ("samples", 2.0, 1.0, 400.0),
@@ -62,7 +63,8 @@ pub const FAULTS: &[FaultKind] =
         .above(20.0, Cut),
         plain("gyro-stuck", Cut, "Rates repeat the last ones."),
         plain("gyro-zero", Cut, "Rates are zero."),
-        // Above 3.5 rad/s it leans by 60° within 0.3 s, and nothing but the rates could have said so.
+        // Above 3.5 rad/s it leans by 60° within 0.3 s, and nothing but the rates could have said
+        // so.
         number("gyro-bias", ("rad/s", 1.0, -35.0, 35.0), Landed, "The roll rate is too high by this.")
             .sized(EitherWay, [0.01, 10.0], "half of the data sheet's offset to a third of the range, after a blow")
             .above(3.5, Cut),
@@ -141,7 +143,7 @@ pub const FAULTS: &[FaultKind] =
         number("hand", ("s", 3.0, 0.1, 600.0), Landed, "A hand holds the vehicle where it is for this long.").sized(
             Number,
             [0.1, 30.0],
-            "a touch to somebody who carries it away",
+            "a touch to a hand that carries it away",
         ),
         plain("baro-silent", Degraded, "No pressure arrives."),
         plain("baro-stuck", Transparent, "Pressure repeats the last sample."),

@@ -36,8 +36,9 @@ impl Course {
         self.steps.iter().any(|step| matches!(step, Step::TakeOff { .. }))
     }
 
-    /// Does the mission ask for this mode? On the way from one that holds height to a manual one the height is held, and so it
-    /// is after a flip, in which no floor is seen, until the place is known again.
+    /// Does the mission ask for this mode? On the way from one that holds height to a manual one
+    /// the height is held, and so it is after a flip, in which no floor is seen, until the place is
+    /// known again.
     pub fn asks_for(&self, mode: FlightMode) -> bool {
         let holds = mode == FlightMode::AltHold;
         let flips = self.steps.iter().any(|step| matches!(step, Step::Flip { .. }));

@@ -1,4 +1,5 @@
-//! The moments at which faults may begin: a flight's, as the truth, the vehicle's status and what is told on the bus show them.
+//! The moments at which faults may begin: a flight's, as the truth, the vehicle's status and what
+//! is told on the bus show them.
 
 use super::sight::Sight;
 use crate::topics::Id;
@@ -13,7 +14,8 @@ const CLIMBED: f32 = 0.15;
 const MOVES: f32 = 0.25;
 /// It hovers after this time in flight.
 const HOVERS: Duration = Duration::from_secs(1);
-/// A throttle stick below this is at its lowest: no climb or descent that a pilot holds asks for so much.
+/// A throttle stick below this is at its lowest: a pilot who holds a climb or a descent stays above
+/// it.
 const LOWEST: f32 = -0.9;
 
 /// What is remembered of a flight to tell its moments.

@@ -1,4 +1,5 @@
-//! What a mission asks of a pilot beside places: another mode, a throttle that is pulled and caught, a turn over.
+//! What a mission asks of a pilot beside places: another mode, a throttle that is pulled and
+//! caught, a turn over.
 
 use super::{Aim, PERIOD, Pilot};
 use crate::simulation::ground_station::turning_over;
@@ -9,18 +10,18 @@ use stampfly_types::{Duration, Vec3};
 const SWITCHED: Duration = Duration::from_millis(140);
 /// A mode that has not begun after this long does not begin.
 const BEGINS: Duration = Duration::from_secs(2);
-/// A throttle stick goes so far past the hover to begin a manual mode.
+/// Distance of the throttle stick past the hover at which a manual mode begins.
 const PAST: f32 = 0.03;
-/// The vehicle is left to itself for so long before it is asked to turn over: it turns over from rest.
+/// Time with centred sticks before the request to turn over: the vehicle turns over from rest.
 const RESTS: Duration = Duration::from_millis(700);
-/// So often it is asked, when it does not.
+/// Requests, when the vehicle does not turn over.
 const TRIES: u32 = 4;
-/// No turn over takes longer.
+/// Longest time that a turn over takes.
 const TURNS: Duration = Duration::from_secs(6);
 
 impl Pilot<'_> {
-    /// Turns the mode switch, and waits until the display shows the mode. A manual mode that is chosen in one that holds
-    /// height begins when the throttle stick passes the hover.
+    /// Turns the mode switch, and waits until the display shows the mode. A manual mode that is
+    /// chosen in one that holds height begins when the throttle stick passes the hover.
     pub(super) async fn turn_to(&mut self, mode: FlightMode, place: Vec3) {
         let began = self.radio.clock().now();
         let passes = mode.is_manual() && !self.flown().is_manual();
@@ -35,8 +36,9 @@ impl Pilot<'_> {
         }
     }
 
-    /// Pulls the throttle to its lowest, and catches a vehicle that falls from it: with full throttle, for as long as takes
-    /// away what it has gained. Where no throttle is no thrust a weight is missing; full throttle is 1/hover of one.
+    /// Pulls the throttle to its lowest, and catches a vehicle that falls from it: with full
+    /// throttle, for as long as takes away what it has gained. Where no throttle is no thrust a
+    /// weight is missing; full throttle is 1/hover of one.
     pub(super) async fn chop(&mut self, seconds: f32) {
         self.hold(-1.0, seconds).await;
         if self.flown().is_manual() {
@@ -58,7 +60,8 @@ impl Pilot<'_> {
         super::stick(self.meaning.hover + self.trim)
     }
 
-    /// Lets a program ask the vehicle to turn over, in a mode that holds height. In the others only a pilot's own sticks do.
+    /// Lets a program ask the vehicle to turn over, in a mode that holds height. In the others only
+    /// a pilot's own sticks do.
     pub(super) async fn turn_over(&mut self, direction: FlipDirection) {
         for _ in 0..TRIES {
             if self.flown().is_manual() || !self.radio.telemetry().armed {

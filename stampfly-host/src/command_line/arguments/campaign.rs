@@ -23,9 +23,10 @@ pub struct CampaignOptions {
     /// Seed of the first flight; the others count up from there.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Fly through what can go wrong: every fault at every moment in every mode, then faults, sizes, moments, missions and
-    /// surroundings at random, one in ten without a fault. Every flight must end as its fault allows (`stampfly faults`), and
-    /// motors that were stopped in the air must have been stopped rightly: flown on, the same flight must have ended badly.
+    /// Fly through what can go wrong: every fault at every moment in every mode, then faults,
+    /// sizes, moments, missions and surroundings at random, one in ten without a fault. Every
+    /// flight must end as its fault allows (`stampfly faults`), and motors that were stopped in the
+    /// air must have been stopped rightly: flown on, the same flight must have ended badly.
     #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot"])]
     pub faults: bool,
     #[command(flatten)]
@@ -46,7 +47,8 @@ pub struct FaultCampaignOptions {
     /// Let half of the random flights with a fault have two.
     #[arg(long, requires = "faults")]
     pub pairs: bool,
-    /// Let all flights be random ones: leave out those with the usual values at every moment in every mode.
+    /// Let all flights be random ones: leave out those with the usual values at every moment in
+    /// every mode.
     #[arg(long, requires = "faults", conflicts_with = "only")]
     pub drawn: bool,
     /// Confine all flights to these faults: each at every moment in every mode, again and again with other seeds.

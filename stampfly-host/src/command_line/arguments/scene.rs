@@ -40,8 +40,9 @@ pub struct SceneOptions {
     /// Let a motion capture system watch: poses at 100 Hz, 30 ms late.
     #[arg(long)]
     pub cameras: bool,
-    /// Let something go wrong; may be repeated. WHEN is calibration, ground, spool, takeoff, hover, move, flip, mode, chop,
-    /// parameter, landing, touch, or a number of seconds; +SECONDS is how long it lasts (see `stampfly faults`).
+    /// Let something go wrong; may be repeated. WHEN is calibration, ground, spool, takeoff, hover,
+    /// move, flip, mode, chop, parameter, landing, touch, or a number of seconds; +SECONDS is how
+    /// long it lasts (see `stampfly faults`).
     #[arg(long, value_name = "NAME[=VALUE]@WHEN[+SECONDS]")]
     pub fault: Vec<String>,
     /// Fly the mission with the sticks of a simulated pilot.
@@ -73,8 +74,8 @@ pub struct FlyOptions {
     pub sticks: Option<PathBuf>,
     #[command(flatten)]
     pub with_sticks: StickArguments,
-    /// Fly on where a protection stops the motors in the air, to see whether that was right: its alert comes, and the motors
-    /// turn on.
+    /// Fly on where a protection stops the motors in the air, to see whether that was right: its
+    /// alert comes, and the motors turn on.
     #[arg(long)]
     pub fly_on: bool,
     /// Seed of everything random.

@@ -42,7 +42,7 @@ const STOPS: Alerts = CONVICTS.without(Alerts::NO_LIFT.with(Alerts::TUMBLED).wit
 /// And it says one of these.
 const WHY: Alerts = Alerts::NO_LIFT.with(Alerts::LOW_BATTERY).with(Alerts::CRITICAL_BATTERY);
 
-/// What there is to see while a stick is held.
+/// Attitude and thrust while a stick is held.
 #[derive(Debug)]
 struct Held {
     /// Least, mean and largest roll, rad, and the largest tilt, rad, once it leans.

@@ -22,7 +22,8 @@ pub const FAULTS: &[FaultKind] = &[
     )
     .sized(Measure::EitherWay, [0.1, 5.0], "the data sheet's offset to half a gravity, after a blow"),
     FaultKind::plain("link-lost", Class::Cut, "No packet arrives."),
-    // With six of ten lost, ten running are lost about once a second, and a tenth of a second is a pilot's reaction.
+    // With six of ten lost, ten running are lost about once a second, and a tenth of a second is a
+    // pilot's reaction.
     FaultKind::number("link-loss", ("", 0.3, 0.0, 1.0), Class::Transparent, "This share of packets is lost.")
         .sized(Measure::Number, [0.01, 1.0], "a quiet room to one in which nothing gets through")
         .above(0.6, Class::Cut),
