@@ -130,7 +130,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     for (place, table) in safety::tables(&campaigns) {
         failures.extend(stale(repository, place, &table, arguments.fix)?);
     }
-    // Flown again in an hour, and not for every change of a gain: said, and no failure.
+    // Flown again in ten minutes, and not for every change of a gain: said, and no failure.
     if golden(repository)? != campaigns.golden {
         println!(
             "docs/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety` flies them again"

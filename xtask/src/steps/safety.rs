@@ -1,7 +1,7 @@
 //! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`,
 //! and prints the tables.
 //!
-//! Takes an hour on two cores, so it is in no lane; the document says with which commit it was
+//! Takes ten to twenty minutes, so it is in no lane; the document says with which commit it was
 //! made. Names of campaigns on the command line fly these alone. The recordings of pilots need the
 //! folder of recorded flights.
 //!
