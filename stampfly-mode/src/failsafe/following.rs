@@ -127,6 +127,23 @@ mod tests {
         }
     }
 
+    /// Motors that stand follow nothing, and are asked anew when they turn again.
+    #[test]
+    fn what_was_missing_before_a_rest_does_not_count_after_it() {
+        let (_, config) = AIRFRAMES[1];
+        let (mut following, mut millis) = (Following::default(), 0);
+        let mut asked = |following: &mut Following| {
+            (0..2_000).find(|_| {
+                millis += 1;
+                following.step(Instant::from_millis(millis), &config, &Vec3::new(4.0, 0.0, 0.0), &Vec3::zeros())
+            })
+        };
+        let (first, on) = (asked(&mut following), asked(&mut following));
+        assert!(first > Some(200) && on == Some(0), "{first:?}, {on:?}");
+        following.rest();
+        assert_eq!(asked(&mut following), first);
+    }
+
     #[test]
     fn a_spin_that_nothing_stops_is_not_followed_and_numbers_that_are_none_say_nothing() {
         let (_, config) = AIRFRAMES[1];
