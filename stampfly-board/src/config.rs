@@ -115,8 +115,6 @@ impl Default for VehicleConfig {
                 // Rotors at full speed turn half as fast again as in a hover.
                 drag: (1.5 * DRAG_VERTICAL / MASS) as f32,
                 drag_square: (DRAG_SQUARE / MASS) as f32,
-                inertia: AIRFRAME.inertia,
-                motor_lag: AIRFRAME.motor_lag,
                 lift_tilt: FALLS_BACK * math::atan2(FOOT_OFFSET as f32, ground_clearance),
                 // Chips, lights and radio take up to 0.4 A; a motor at a quarter of its duty takes as much again.
                 idle_current: 0.6,

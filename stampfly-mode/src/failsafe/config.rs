@@ -1,6 +1,6 @@
 //! Thresholds, times and filter weights of the [failsafe](super).
 
-use stampfly_types::{Duration, GRAVITY, Vec3};
+use stampfly_types::{Duration, GRAVITY};
 
 /// A motor is weak when this share of its thrust is missing. Of half a propeller 0.5 is, and a step of the demand has to exceed
 /// the limit for a while.
@@ -105,11 +105,6 @@ pub struct FailsafeConfig {
     pub drag: f32,
     /// What each metre a second adds to that share, 1/m.
     pub drag_square: f32,
-    /// Moments of inertia about the body's axes, kg·m². Infinite where nothing is known of the
-    /// airframe: then its rates follow.
-    pub inertia: Vec3,
-    /// Time constant of a motor with its propeller, s.
-    pub motor_lag: f32,
     /// Tilt of a vehicle that tumbles while armed on the ground, rad.
     pub armed_tilt: f32,
     /// Tilt of a vehicle that tumbles in ACRO, rad.
@@ -184,8 +179,6 @@ impl Default for FailsafeConfig {
             hover_thrust: f32::INFINITY,
             drag: f32::INFINITY,
             drag_square: 0.0,
-            inertia: Vec3::repeat(f32::INFINITY),
-            motor_lag: 0.02,
             armed_tilt: 1.31,
             acro_tilt: 2.1,
             acro_time: Duration::from_secs(1),

@@ -7,8 +7,7 @@
 //!
 //! What the motors push with is what duties and battery voltage make, not what was asked for: a
 //! tired battery gives less. A force without such a reason is an error of the accelerometer, or of
-//! what is known of the vehicle. In the air the vehicle lands with it; whether it still answers to
-//! its motors, [`follows`](super::follows) says.
+//! what is known of the vehicle. In the air the vehicle lands with it.
 //!
 //! Finds a scale that is wrong by a third or more. Not for less: a propeller out of balance moves
 //! the accelerometer's zero, and the thrust of a motor is known to some tenths.
@@ -56,8 +55,8 @@ pub(super) struct ForceMonitor {
 }
 
 impl ForceMonitor {
-    /// Takes a sample. Has the force no reason now, and has it had none for [`LASTS`]? `known`: the
-    /// motors push with what duties and voltage make.
+    /// Takes a sample. Has the force had no reason for [`LASTS`]? `known`: the motors push with what
+    /// duties and voltage make.
     pub(super) fn step(
         &mut self,
         config: &FailsafeConfig,
@@ -65,7 +64,7 @@ impl ForceMonitor {
         imu: &ImuData,
         input: &FailsafeInput<'_>,
         known: bool,
-    ) -> [bool; 2] {
+    ) -> bool {
         let dt = self.last.replace(at).map_or(0.0, |last| smaller(at.since(last).seconds(), LONGEST_STEP));
         let thrust = input.thrust.filter(|_| config.hover_thrust.is_finite() && known);
         let pushed = thrust.map(|thrust| thrust * (GRAVITY / config.hover_thrust));
@@ -88,7 +87,7 @@ impl ForceMonitor {
             }
             FlightPhase::Init | FlightPhase::IdleHeld | FlightPhase::Armed => false,
         };
-        [unexplained, lasting(&mut self.since, at, unexplained) >= LASTS]
+        lasting(&mut self.since, at, unexplained) >= LASTS
     }
 
     /// Square of what is left of the force without thrust and drag, (m/s²)². Any drag up to the

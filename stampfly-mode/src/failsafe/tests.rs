@@ -1,7 +1,6 @@
 //! What the failsafe finds and what it does not.
 
 mod battery;
-mod follows;
 mod force;
 mod inertial;
 mod lift;

@@ -237,8 +237,7 @@ message_flags! {
         MOTOR_RUNS = 24,
         /// The thrust that is asked for does not lift the vehicle off the ground: motors off.
         NO_LIFT = 25,
-        /// The specific force is not what thrust and drag make, and the vehicle answers to its
-        /// motors.
+        /// The specific force is not what thrust and drag make.
         FORCE_IMPLAUSIBLE = 26,
     }
 }

@@ -95,7 +95,7 @@ fn a_gyro_whose_zero_jumps_is_flown_on_with() {
 }
 
 #[test]
-fn an_inertial_sensor_of_half_the_scale_stops_the_motors() {
+fn an_inertial_sensor_of_half_the_scale_ends_in_a_landing() {
     for seed in seeds() {
         for scale in [0.3, 0.4, 0.5] {
             let lie: Box<dyn FnMut(f32, &mut ImuData)> = Box::new(move |_, imu| {
@@ -103,11 +103,14 @@ fn an_inertial_sensor_of_half_the_scale_stops_the_motors() {
                 imu.gyro *= scale;
             });
             let lies = Lies { imu: Some(lie), ..Lies::default() };
-            let (seen, since) = fly(seed, 14.0, Onset::After(FlightPhase::Flying, 1.0), lies);
-            let took = seen.motors_off_after(since);
-            println!("{scale}, seed {seed}: {took}");
+            let (seen, since) = fly(seed, 30.0, Onset::After(FlightPhase::Flying, 1.0), lies);
+            let landing = seen.entered(FlightPhase::Landing, since).expect("noticed");
+            let (took, drift, highest) = (landing.since(since), seen.drift(since, Instant::MAX), seen.highest(since));
+            println!("{scale}, seed {seed}: {took}, {drift:.2} m, {highest:.2} m, {:?}", seen.end().0);
             // Less than that, and what comes in a hard manoeuvre of a sound vehicle would be taken for it.
-            assert!(took <= Duration::from_secs(2), "{scale}, seed {seed}: {took}");
+            assert!(took <= Duration::from_secs(3), "{scale}, seed {seed}: {took}");
+            assert!(drift < 1.5 && highest < 1.0, "{scale}, seed {seed}: {drift} m, {highest} m");
+            assert!(!seen.end().0.armed && seen.end().1.contact, "{scale}, seed {seed}: it has landed");
         }
     }
 }
