@@ -85,6 +85,8 @@ fn it_takes_off_by_hand() {
                 }
                 let askew = move |simulation: &mut stampfly_sim::SimulationConfig| {
                     (simulation.plant.centre_x, simulation.plant.centre_y) = (forward, right);
+                    // What a specimen's own centre adds is more than a hand corrects.
+                    simulation.plant.manufacturing_spread = 0.0;
                 };
                 let seen = run_in(askew, Lies::default(), seed, 30.0, |mut hands| {
                     Box::pin(async move {

@@ -23,7 +23,7 @@ mod turning;
 use crate::losses::harness::{Hands, STICKS, Seen};
 use crate::thorough::thorough;
 use stampfly_types::messages::{Alerts, FlightMode, FlightPhase, PilotInput};
-use stampfly_types::{Instant, Vec3};
+use stampfly_types::{Duration, Instant, Vec3};
 
 /// What no sound vehicle is accused of.
 const CONVICTS: Alerts = Alerts::IMPACT
@@ -68,10 +68,12 @@ impl Seen {
         Some((of(all), -truth.1.position.z))
     }
 
-    /// When it first touched the ground after it had been this high, or the end.
+    /// A moment before it first touched the ground after it had been this high, or the end. What it
+    /// feels of the ground comes in the same step of the simulation.
     fn touches_after(&self, height: f32) -> Instant {
         let flown = self.truths.iter().skip_while(|(_, truth)| -truth.position.z < height);
-        flown.clone().find(|(_, truth)| truth.contact).map_or(Instant::MAX, |(at, _)| *at)
+        let touched = flown.clone().find(|(_, truth)| truth.contact);
+        touched.map_or(Instant::MAX, |(at, _)| *at - Duration::from_millis(10))
     }
 
     /// It lies on the ground with its motors off, touched it no faster than this, m/s, and upright.
