@@ -2,15 +2,15 @@
 //!
 //! Motion, motors and their demands at twenty samples a second and more, because an accident is over in a tenth of one;
 //! decisions when they change; what can be computed from other topics, or ended before the flight, not at all. That is
-//! more than four and a half seconds in [`WORDS`]. Not for the analysis of a whole flight: the log of a host keeps every sample.
+//! more than three and a half seconds in [`WORDS`]. Not for the analysis of a whole flight: the log of a host keeps every sample.
 
 use crate::topics::{COUNT, Id, TOPICS};
 use stampfly_flight::black_box::{LogRate, Retention};
 use stampfly_flight::newest::message;
 use stampfly_types::messages::FlightStatus;
 
-/// Memory that the firmware has for it, words: 36 KiB.
-pub const WORDS: usize = 9 * 1024;
+/// Memory that the firmware has for it, words: 28 KiB.
+pub const WORDS: usize = 7 * 1024;
 
 /// A black box for this vehicle.
 pub type BlackBox<const WORDS: usize> = stampfly_flight::BlackBox<WORDS, COUNT>;

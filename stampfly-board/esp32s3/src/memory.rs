@@ -17,12 +17,12 @@ const PERIOD: Duration = Duration::from_millis(5);
 #[cfg(all(feature = "record", feature = "wifi"))]
 compile_error!("the features `record` and `wifi` do not fit into the StampFly's memory together");
 
-/// Size of the black box. Next to the flight record there is room for three seconds of a flight, next to the network for two and
-/// a half.
+/// Size of the black box. Next to the flight record there is room for two seconds of a flight, next to
+/// the network for one and three quarters.
 const WORDS: usize = if cfg!(feature = "wifi") {
-    5 * 1024
+    7 * 512
 } else if cfg!(feature = "record") {
-    6 * 1024
+    4 * 1024
 } else {
     black_box::WORDS
 };
