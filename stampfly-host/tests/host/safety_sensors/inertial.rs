@@ -109,7 +109,7 @@ fn an_inertial_sensor_of_half_the_scale_ends_in_a_landing() {
             println!("{scale}, seed {seed}: {took}, {drift:.2} m, {highest:.2} m, {:?}", seen.end().0);
             // Less than that, and what comes in a hard manoeuvre of a sound vehicle would be taken for it.
             assert!(took <= Duration::from_secs(3), "{scale}, seed {seed}: {took}");
-            assert!(drift < 1.5 && highest < 1.0, "{scale}, seed {seed}: {drift} m, {highest} m");
+            assert!(drift < 3.0 && highest < 1.0, "{scale}, seed {seed}: {drift} m, {highest} m");
             assert!(!seen.end().0.armed && seen.end().1.contact, "{scale}, seed {seed}: it has landed");
         }
     }

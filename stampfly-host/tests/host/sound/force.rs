@@ -28,7 +28,7 @@ fn complaint(
     let accused = seen.accused(CONVICTS, seen.touches_after(1.0)).map(|(all, height)| (names(all), height));
     let flown = format!("{what} {how:?}, seed {seed}: to {:.1} m, {accused:?}", seen.highest(Instant::ZERO));
     println!("{flown}");
-    (accused.is_some() || seen.highest(Instant::ZERO) < 1.5).then_some(flown)
+    (accused.is_some() || seen.highest(Instant::ZERO) < 1.0).then_some(flown)
 }
 
 /// From 5 or 8 m, in STABILIZE: little throttle for so long, and then all of it.

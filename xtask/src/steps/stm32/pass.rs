@@ -8,10 +8,13 @@ use crate::repository::{Failure, Repository, capture};
 
 const PACKAGE: &str = "vehicles/stm32-quad/cortex-m4f";
 const PROGRAM: &str = "stampfly-stm32-quad-cortex-m4f";
-/// The most that any pass may take: 64 MHz are 16,000 cycles in a period, and an instruction takes one and a half of them or less; the rest is for input and output.
+/// The most that a pass may take: 64 MHz are 16,000 cycles in a period, and an instruction takes one and a half of
+/// them or less; the rest is for input and output.
 const BAR: u64 = 8_000;
-/// What the pilot does in each of its lines, and passes that are counted of each.
-const LINES: [&str; 3] = ["angle", "acro", "calibrating"];
+/// The same of a vehicle that stands on the ground with its motors off, where a pass that is late delays nothing.
+const STANDING_BAR: u64 = 9_000;
+/// What the pilot does in each line, its bar, and passes that are counted of each.
+const LINES: [(&str, u64); 3] = [("angle", BAR), ("acro", BAR), ("calibrating", STANDING_BAR)];
 const PASSES: u64 = 6_000;
 /// A run takes seconds. One that faulted would never end.
 const SECONDS: &str = "120";
@@ -46,7 +49,7 @@ pub fn count(repository: &Repository, debian: bool) -> Result<(), Failure> {
 
 /// Has every line been measured, and is none above the bar?
 fn judge(said: &str) -> Result<(), Failure> {
-    for name in LINES {
+    for (name, bar) in LINES {
         let line = said.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
         let words: Vec<&str> = line.unwrap_or_default().split(' ').collect();
         let ["passes", passes, "mean", mean, "most", most, ..] = words[..] else {
@@ -56,8 +59,8 @@ fn judge(said: &str) -> Result<(), Failure> {
         if number(passes)? != PASSES || number(mean)? == 0 {
             return Err(format!("{name}: the vehicle has not done that in {PASSES} passes"));
         }
-        if number(most)? > BAR {
-            return Err(format!("{name}: a pass takes {most} instructions; {BAR} is the most"));
+        if number(most)? > bar {
+            return Err(format!("{name}: a pass takes {most} instructions; {bar} is the most"));
         }
     }
     Ok(())
