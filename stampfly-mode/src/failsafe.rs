@@ -36,7 +36,7 @@
 //! | samples that are not finite, silence | 20 ms; motors off within 25 ms |
 //! | full scale, garbage for good | 10 ms, 53 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
-//! | scale of a half or less, of both | a second; it lands |
+//! | scale of a half or less, of both | a second, where it still flies then; it lands |
 //! | range stuck at 3 cm, outliers, aliased or off by a step, frozen, ramp | 0.3 s, 0.35 s, 0.25 s, 1.5 s, 3.9 to 4.9 s |
 //! | flow zero, frozen, offset, reversed or swapped | 0.2 to 0.4 s, 0.4 s, 0.2 s, 0.7 to 3.1 s |
 //! | battery reading of nothing, or 0.35 V off | the first such reading, the second |
