@@ -36,7 +36,7 @@ use embassy_time::Timer;
 use memory::Memory;
 use panic_probe as _;
 use stampfly_drivers::{EmbassyClock, Timebase as _};
-use stampfly_flight::Assembled;
+use stampfly_flight::{Assembled, InPlace};
 use stampfly_stm32_quad::schedule::Runnables;
 use stampfly_stm32_quad::topics::{Bus, Outside};
 use static_cell::StaticCell;
@@ -77,10 +77,11 @@ async fn main(spawner: Spawner) {
 
     let stored = memory.borrow_mut().load();
     static BUS: StaticCell<Bus> = StaticCell::new();
-    static ASSEMBLED: StaticCell<flight::Loop> = StaticCell::new();
+    static FLIGHT_LOOP: StaticCell<flight::Loop> = StaticCell::new();
     let now = EmbassyClock.now();
-    let Assembled { flight_loop, outside, taps } =
-        Assembled::<Runnables>::new(BUS.init_with(Bus::new), None, &stored.parameters, now);
+    // The stack has no room for a copy of the flight loop.
+    let InPlace { flight_loop, outside, taps } =
+        Assembled::<Runnables>::in_place(FLIGHT_LOOP.uninit(), BUS.init_with(Bus::new), None, &stored.parameters, now);
     let Outside { imu, battery, receiver, motors: duties, lights: shown, link } = outside;
 
     let sensor =
@@ -88,7 +89,7 @@ async fn main(spawner: Spawner) {
     interrupt::SPI3.set_priority(Priority::P6);
     let mut watchdog = IndependentWatchdog::new(board.IWDG, flight::STALLED);
     watchdog.unleash();
-    let parts = flight::Parts { flight_loop: ASSEMBLED.init(flight_loop), sensor, imu, motors, duties, watchdog };
+    let parts = flight::Parts { flight_loop, sensor, imu, motors, duties, watchdog };
     FLIGHT.start(interrupt::SPI3).spawn(flight::fly(parts).expect("the first of its kind"));
 
     let radio =

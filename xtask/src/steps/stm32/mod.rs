@@ -43,8 +43,11 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     if flash == 0 || flash > FLASH.1 || memory + STACK > MEMORY.1 {
         return Err("it does not fit".into());
     }
-    pass::count(repository, debian)?;
-    boot::boot(repository, &program)
+    let failures: Vec<Failure> = [pass::count(repository, debian), boot::boot(repository, &program)]
+        .into_iter()
+        .filter_map(Result::err)
+        .collect();
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }
 }
 
 /// Bytes of flash and of memory that a program takes.
