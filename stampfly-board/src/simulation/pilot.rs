@@ -14,8 +14,8 @@
 //! In the modes that hold height, turning the arm switch off lands. In the others the pilot sinks to the ground, pulls the
 //! throttle down and turns the switch off. The heading is kept: places in a mission are flown to, headings are not.
 //!
-//! `tricks` is what a mission asks of a pilot beside places; `sticks` the pilot who plays a stick
-//! file, however that ends.
+//! `tricks` has the steps of a mission that are no places, `sticks` the pilot that replays a stick
+//! file, whatever the vehicle does.
 
 mod sticks;
 mod tricks;

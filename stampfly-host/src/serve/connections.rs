@@ -76,9 +76,10 @@ pub(super) struct Connections {
 #[derive(Debug)]
 struct Queue {
     bytes: Outbox,
-    /// The how many-th it is, and whether it has shown that it speaks the port's language; where
-    /// the key is asked for, that it has the key.
+    /// Connections are numbered in the order in which they opened.
     number: u64,
+    /// Its bytes have been frames of the port's protocol; at a port that requires the key, signed
+    /// with it.
     is_shown: bool,
     /// Is what finds no room lost? A serial line stays, whether or not a program reads there.
     stays: bool,

@@ -94,9 +94,8 @@ fn a_tired_battery_ends_in_a_landing() {
     }
 }
 
-/// It was stopped as it took off. Now it flies, and comes down on the floor of 22° as on any other.
-/// There it lies as its floor does, which is more than the 20° with which a vehicle is taken to
-/// have landed.
+/// The vehicle was stopped as it took off. Now it flies, and lands on the floor of 22° as on any
+/// other. It then stands at the tilt of the floor, 22°; the judge calls a vehicle landed up to 20°.
 #[test]
 fn a_floor_that_tilts_under_the_take_off_is_left() {
     let options = Options { fault: texts(&["slope=0.4@takeoff"]), ..Options::default() };
@@ -122,13 +121,12 @@ fn legal_parameters_that_did_not_fit_each_other() {
     }
 }
 
-/// Where half of the distance or more is left under the vehicle, it knows the table. Where less is
-/// left, the range is taken for one whose phase wraps: the barometer holds the height, and flow is
-/// not accused.
+/// The estimator takes a range that falls to half or more for a table. It takes a shorter one for a
+/// phase that wraps: the barometer then holds the height, and `FLOW_IMPLAUSIBLE` stays off.
 ///
-/// At 0.7 m there are 0.2 m left, and the barometer is off by as much. Two of three vehicles touch
-/// the table, which shows as `IMPACT` and as `MOTOR_WEAK`: they stop upright on it, before the
-/// mission asked for it.
+/// At 0.7 m, 0.2 m are left above the table, and the barometer is off by as much. Two of three
+/// vehicles touch the table, raise `IMPACT` or `MOTOR_WEAK`, and stop upright on it before the
+/// mission lands them.
 #[test]
 fn a_table_under_the_vehicle_does_not_accuse_the_flow() {
     for height in ["0.7", "0.8", "0.9", "1.0"] {

@@ -196,8 +196,8 @@ fn sizes_are_drawn_evenly_in_their_logarithm() {
         let n = shares.len() as f64;
         let apart = shares.iter().enumerate().map(|(place, share)| (share - (place as f64 + 0.5) / n).abs());
         let apart = apart.fold(0.0, f64::max);
-        // Kolmogorov and Smirnov: of so many faults one is beyond 1.63/√n by chance; none is beyond
-        // 2.2/√n.
+        // Kolmogorov and Smirnov: by chance one fault in a hundred is beyond 1.63/√n, and one in eight
+        // thousand beyond 2.2/√n.
         assert!(n > 100.0 && apart < 2.2 / n.sqrt(), "{fault}: {apart} with {n} sizes");
     }
     // All together, by tenths.

@@ -26,8 +26,7 @@ fn stampfly_ends(folder: &Path, arguments: &[&str], code: i32) -> String {
 }
 
 /// A campaign of faults, whose flights are judged, and the last one is flown again from its row.
-/// `failed` of them end worse than their faults allow: as many as are known, and neither more nor
-/// fewer.
+/// Exactly `failed` of them end worse than their faults allow: the known ones.
 pub fn campaign_of_faults(folder: &Path, vehicle: &str, (flights, failed): (u64, u64)) {
     let (count, last) = (flights.to_string(), (flights - 1).to_string());
     let campaign = ["campaign", "--vehicle", vehicle, "--faults", "--flights", &count, "--json"];

@@ -356,8 +356,8 @@ impl Vehicle {
         Held { counter: number, is_number: true }
     }
 
-    /// What became of a command that was held. One that was done is to be acknowledged. One that
-    /// was not is returned again if it is said again: the caller says why, and does not do it.
+    /// Ends the hold of a command. A command that was done will be acknowledged. One that was not
+    /// done is returned again when the station repeats it: the caller then repeats the refusal.
     pub fn settle(&mut self, held: Held, is_done: bool) {
         let Held { counter, is_number } = held;
         if is_number && self.numbered == Some(counter) {

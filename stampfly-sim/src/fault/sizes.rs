@@ -1,9 +1,9 @@
 //! How large a fault is: the range that is plausible, with the reason, and the draw of a campaign.
 //!
-//! What a fault is drawn by is its *size*, how far its number is from the one with which it changes
-//! nothing. Sizes are drawn evenly in their logarithm: one that is just felt is as likely as a
-//! gross one, where an even draw over the range would hardly ever give the small ones, which are
-//! the hard ones to find. Use it for faults with a number; others have no size.
+//! The *size* of a fault is the distance of its number from the number with which it changes
+//! nothing. A campaign draws sizes evenly in their logarithm, so that small faults, which are hard
+//! to find, are as likely as gross ones. An even draw over the range would hardly ever give a small
+//! one. Use it for faults with a number; others have no size.
 
 use crate::noise::Noise;
 use core::fmt;

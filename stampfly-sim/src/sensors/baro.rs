@@ -153,8 +153,8 @@ mod tests {
         }
     }
 
-    /// What the propellers add to the pressure at a height, m, when they turn so much faster than
-    /// in a hover, Pa.
+    /// Pressure that the propellers add at a height, m, when they turn `faster` times as fast as in a
+    /// hover, Pa.
     fn added(conditions: &Conditions, height: f64, faster: f64) -> f64 {
         let pressure = |faster: f64| {
             let mut motion = Motion { rotor_speed: [HOVER * faster; 4], ..Motion::default() };

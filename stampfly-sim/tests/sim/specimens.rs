@@ -1,8 +1,8 @@
-//! How far specimens lie apart: what the harsh world draws, against the figures it is drawn from,
-//! and what the sensors then measure, against what is true.
+//! Differences between specimens: the draws of the harsh world are compared with the figures that
+//! they come from, and the readings of the sensors with the truth.
 //!
-//! Seeds are fixed, so these tests always see the same specimens; the bounds are what as many
-//! others would keep, too.
+//! Seeds are fixed, so these tests always see the same specimens. The bounds hold for as many
+//! specimens of any other seeds.
 
 use nalgebra::Vector3;
 use stampfly_drivers::{Imu, OpticalFlow, RangeFinder};

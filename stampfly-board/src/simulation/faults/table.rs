@@ -51,8 +51,8 @@ pub const FAULTS: &[FaultKind] =
             [1.02, 2.0],
             "a few times the sensitivity's tolerance to a range register that is one step off",
         ),
-        // On its last rates it flies for some 50 ms, 20 samples: at 3 rad/s, which a gust makes, it
-        // leans by 9° more than it knows.
+        // On its last rates the vehicle flies for 50 ms, 20 samples: at 3 rad/s, which a gust makes,
+        // its tilt is then 9° larger than the estimate.
         number(
             "imu-garbage",
             ("samples", 2.0, 1.0, 400.0),

@@ -1,5 +1,5 @@
-//! The moments at which faults may begin: a flight's, as the truth, the vehicle's status and what
-//! is told on the bus show them.
+//! The moments of a flight at which faults may begin, from the truth, the vehicle's status and the
+//! topics of the bus.
 
 use super::sight::Sight;
 use crate::topics::Id;

@@ -1,5 +1,5 @@
-//! What a mission asks of a pilot beside places: another mode, a throttle that is pulled and
-//! caught, a turn over.
+//! Steps of a mission that are no places: another mode, a throttle that the pilot pulls and catches,
+//! a flip.
 
 use super::{Aim, PERIOD, Pilot};
 use crate::simulation::ground_station::turning_over;

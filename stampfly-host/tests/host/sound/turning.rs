@@ -128,11 +128,11 @@ fn scaled(by: f32) -> Lies {
 
 /// Those without figures end level near their place in every flight.
 ///
-/// What a gyro is wrong by while it is all that tells the attitude stays in the attitude: half a
-/// radian a second is 29 degrees after the second that a flip takes, a scale that changes by a
-/// tenth 36 degrees, and with one that changes by a fifth most flights end in a crash. A vehicle
-/// that does not see the floor drifts on as it was until it has landed. On a dead bus two of 96
-/// land tilting, without any height.
+/// During a flip only the gyro measures the attitude, so its error stays in the attitude: half a
+/// radian a second makes 29 degrees in the second that a flip takes, a scale that changes by a tenth
+/// makes 36 degrees, and with a scale that changes by a fifth most flights end in a crash. A vehicle
+/// that does not see the floor keeps its drift until it has landed. On a dead bus, without any
+/// height, two of 96 vehicles land tilted.
 const KINDS: [Kind; 12] = [
     kind("accel z -4", || imu(|_, imu| imu.accel.z -= 4.0)).ends(FLOWN, [6.0, 94.0]),
     kind("half the range", || tof(|_, tof| tof.distance *= 0.5)),
