@@ -73,8 +73,14 @@ fn it_takes_off_hovers_and_lands() {
     none(&found);
 }
 
-/// What still fails by hand, one of 80 thorough flights: `MOTOR_WEAK` lands it.
-const KNOWN: &str = "Stabilize, 2.8 and 2.8 mm, seed 1";
+/// Four of 92 thorough flights still fail by hand: the centre of these specimens lies aside by
+/// itself, and `TUMBLED` or `MOTOR_WEAK` ends the flight.
+const KNOWN: [&str; 4] = [
+    "Stabilize, 0.0 and -4.0 mm, seed 2",
+    "Stabilize, -2.8 and -2.8 mm, seed 2",
+    "Acro, 0.0 and -3.0 mm, seed 2",
+    "Stabilize, -2.8 and 2.8 mm, seed 4",
+];
 
 /// By hand, in a mode whose throttle is thrust.
 #[test]
@@ -88,8 +94,6 @@ fn it_takes_off_by_hand() {
                 }
                 let askew = move |simulation: &mut stampfly_sim::SimulationConfig| {
                     (simulation.plant.centre_x, simulation.plant.centre_y) = (forward, right);
-                    // What a specimen's own centre adds is more than a hand corrects.
-                    simulation.plant.manufacturing_spread = 0.0;
                 };
                 let seen = run_in(askew, Lies::default(), seed, 30.0, |mut hands| {
                     Box::pin(async move {
@@ -125,7 +129,7 @@ fn it_takes_off_by_hand() {
             }
         }
     }
-    let (known, found): (Vec<_>, Vec<_>) = found.into_iter().partition(|what| what == KNOWN);
+    let (known, found): (Vec<_>, Vec<_>) = found.into_iter().partition(|what| KNOWN.contains(&what.as_str()));
     none(&found);
-    assert_eq!(known.len(), 1, "a known failure ends well");
+    assert_eq!(known.len(), thorough(0, KNOWN.len()), "a known failure ends well");
 }

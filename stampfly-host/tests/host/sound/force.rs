@@ -10,7 +10,10 @@ type Script = for<'a, 'b> fn(&'a mut Hands<'b>, [f32; 3]) -> Pin<Box<dyn Future<
 const STABILIZE: PilotInput = PilotInput { mode: FlightMode::Stabilize, arm: true, ..STICKS };
 const ACRO: PilotInput = PilotInput { mode: FlightMode::Acro, arm: true, ..STICKS };
 
-/// What is wrong about a flight: what it is accused of before it touches the ground.
+/// A vehicle that was this high has flown, m, and its next touch of the ground ends the flight.
+const FLOWN: f32 = 1.0;
+
+/// The alerts of a flight before it touches the ground, if there are any, or that it has not flown.
 fn complaint(
     what: &str,
     surroundings: impl FnOnce(&mut SimulationConfig),
@@ -25,10 +28,10 @@ fn complaint(
             hands.sleep(0.1).await;
         })
     });
-    let accused = seen.accused(CONVICTS, seen.touches_after(1.0)).map(|(all, height)| (names(all), height));
+    let accused = seen.accused(CONVICTS, seen.touches_after(FLOWN)).map(|(all, height)| (names(all), height));
     let flown = format!("{what} {how:?}, seed {seed}: to {:.1} m, {accused:?}", seen.highest(Instant::ZERO));
     println!("{flown}");
-    (accused.is_some() || seen.highest(Instant::ZERO) < 1.0).then_some(flown)
+    (accused.is_some() || seen.highest(Instant::ZERO) < FLOWN).then_some(flown)
 }
 
 /// From 5 or 8 m, in STABILIZE: little throttle for so long, and then all of it.
