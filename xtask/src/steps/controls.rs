@@ -87,8 +87,8 @@ fn tried(repository: &Repository, clone: &Path, control: &Control) -> Result<Str
         git(&["reset", "--quiet", "--hard", "HEAD~1"])?;
     }
     // Paths are those of the repository, whichever machine this is.
-    let folder = format!("{}/", clone.display());
-    judged(control, said?).map(|line| line.replace(&folder, ""))
+    let folders = [clone, &repository.target(FOLDER)].map(|folder| format!("{}/", folder.display()));
+    judged(control, said?).map(|line| folders.iter().fold(line, |line, folder| line.replace(folder, "")))
 }
 
 /// Runs the step in the clone. Returns whether it passed and everything it wrote.
