@@ -73,8 +73,8 @@ fn it_takes_off_hovers_and_lands() {
     none(&found);
 }
 
-/// Four of 92 thorough flights still fail by hand: the centre of these specimens lies aside by
-/// itself, and `TUMBLED` or `MOTOR_WEAK` ends the flight.
+/// By hand, `TUMBLED` or `MOTOR_WEAK` ends these four of 92 thorough flights. The simulator adds the
+/// specimen's own offset of the centre of mass to the one in the name.
 const KNOWN: [&str; 4] = [
     "Stabilize, 0.0 and -4.0 mm, seed 2",
     "Stabilize, -2.8 and -2.8 mm, seed 2",
