@@ -8,7 +8,7 @@
 //! Constants are `f64`, for the simulation; the flight stack computes with their nearest `f32`.
 
 use stampfly_control::{Airframe, MotorCurve, MultirotorMixer, Rotor};
-use stampfly_types::Vec3;
+use stampfly_types::{Duration, Vec3};
 
 /// Take-off mass, battery included, kg (measured).
 pub const MASS: f64 = 0.0368;
@@ -35,6 +35,14 @@ pub const DRAG_SQUARE: f64 = 0.004;
 pub const GROUND_HEIGHT: f64 = 0.03;
 /// Distance of each foot from the body's x and y axis, m.
 pub const FOOT_OFFSET: f64 = 0.030;
+
+/// For so long it flies on its last rates. A disturbance of four fifths of its authority, which
+/// nothing meets meanwhile and the rest then brakes, turns it by 262 rad/s²·(50 ms)²/2·5: a quarter
+/// of a turn, from which it levels.
+pub const LAST_RATES: Duration = Duration::from_millis(50);
+/// Motors that get no duties for this long are stopped: what the flight task may be late by, and two
+/// of the controller's deadlines of 5 ms.
+pub const CUT_OFF: Duration = Duration::from_millis(60);
 
 /// The airframe. One LiHV cell.
 pub const AIRFRAME: Airframe = Airframe {

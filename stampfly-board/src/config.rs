@@ -3,7 +3,7 @@
 //! Each crate owns its own configuration and the rules by which it follows from an airframe; this struct only gathers
 //! them, for the StampFly's [`AIRFRAME`]. The names people use are in [`parameters`](crate::parameters).
 
-use crate::airframe::{AIRFRAME, DRAG, DRAG_SQUARE, DRAG_VERTICAL, FOOT_OFFSET, GROUND_HEIGHT, MASS};
+use crate::airframe::{AIRFRAME, DRAG, DRAG_SQUARE, DRAG_VERTICAL, FOOT_OFFSET, GROUND_HEIGHT, LAST_RATES, MASS};
 use stampfly_control::guidance::NavigatorConfig;
 use stampfly_control::{CascadeConfig, FlipConfig, GeometricConfig, IndiConfig, MotorConfig};
 use stampfly_eskf::calibration::Corrections;
@@ -109,6 +109,7 @@ impl Default for VehicleConfig {
                 ..ModeConfig::default()
             },
             failsafe: FailsafeConfig {
+                imu_lost: LAST_RATES,
                 weak_roll: weak.x,
                 weak_pitch: weak.y,
                 hover_thrust: AIRFRAME.hover_thrust(),

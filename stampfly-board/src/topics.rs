@@ -56,7 +56,7 @@ stampfly_bus::topics! {
 
     // Decisions.
     /// Conditions the failsafe has found.
-    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [mode, command, control, notification, telemetry];
+    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [landing, mode, command, control, notification, telemetry];
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, calibration, notification, telemetry, link];
     /// Why the vehicle did not arm when it was asked to; for people.

@@ -161,7 +161,10 @@ impl Estimator for Complementary {
         }
         self.now = at;
         let dt = dt.min(0.5);
-        let motion = self.state.propagate(&imu.accel, &imu.gyro, dt);
+        // Thrust carries the weight along the body's axis, and says nothing about which way is up.
+        let felt = !self.command.accel_faulty;
+        let accel = if felt { imu.accel } else { Vec3::new(0.0, 0.0, -GRAVITY) };
+        let motion = self.state.propagate(&accel, &imu.gyro, dt);
         (self.rate, self.force) = (motion.rate, motion.force);
         let stationary = self.anchor.is_some();
         if let Some(anchor) = self.anchor {
@@ -169,7 +172,7 @@ impl Estimator for Complementary {
             self.state.velocity = Vec3::zeros();
         }
         // In flight over a visible surface flow holds the tilt; otherwise gravity does.
-        if stationary || !self.recent(self.flow_fused) {
+        if felt && (stationary || !self.recent(self.flow_fused)) {
             let norm = imu.accel.norm();
             if (0.8 * GRAVITY..1.2 * GRAVITY).contains(&norm) {
                 let up = rotate_back(&self.state.rotation(), &-Vec3::z());

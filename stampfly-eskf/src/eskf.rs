@@ -10,6 +10,7 @@
 //! | `eskf.rs` | the filter's state, time alignment and update |
 //! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
 //! | `eskf/bridge.rs` | inertial samples that are garbage |
+//! | `eskf/unfelt.rs` | an accelerometer that does not measure |
 //! | `eskf/measurements.rs` | one update a sensor |
 //! | `eskf/external.rs` | position, velocity, attitude from outside; measurements with a model of one's own |
 //! | `eskf/airspeed.rs` | airspeeds and the wind |
@@ -39,6 +40,7 @@ mod measurements;
 mod pseudo_measurements;
 mod resets;
 mod standing;
+mod unfelt;
 mod vertical;
 mod wander;
 
@@ -507,7 +509,7 @@ impl Eskf {
 
     /// Does drag show the velocity? Only where nothing else does.
     fn feels_drag(&self) -> bool {
-        self.config.drag > 0.0 && self.command.flying && !self.is_velocity_aided()
+        self.config.drag > 0.0 && !self.command.accel_faulty && self.command.flying && !self.is_velocity_aided()
     }
 
     /// Is the horizontal velocity known well enough to brake by it?
@@ -530,7 +532,9 @@ impl Eskf {
     // Once in four steps or more: apart, so that the code of every step is short and can be kept in fast memory.
     #[inline(never)]
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
-        if self.anchor.is_some() {
+        if self.command.accel_faulty {
+            self.go_on_unfelt(dt);
+        } else if self.anchor.is_some() {
             if let Some(shift) = self.standing.step(dt, &accel, &self.rate) {
                 self.correct_standing_gyro(&shift);
             }

@@ -48,6 +48,8 @@ fn above(value: f32, limit: f32) -> Option<(f32, f32)> {
 const SILENT_SENSOR: Alerts = Alerts::IMU_DEGRADED
     .with(Alerts::IMU_LOST)
     .with(Alerts::IMU_FAULTY)
+    .with(Alerts::ACCEL_FAULTY)
+    .with(Alerts::FORCE_IMPLAUSIBLE)
     .with(Alerts::IMU_NOISY)
     .with(Alerts::POWER_LOST);
 

@@ -4,15 +4,17 @@
 //!
 //! | alert | condition | clears |
 //! |---|---|---|
-//! | `IMPACT` | ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, in four that follow from each other when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
+//! | `IMPACT` | a blow that does not come from above: ‖accel‖ over about 10 ms above 3 g (6 g while landing; a push from below does not count within 0.2 m of the ground at less than 1.2 m/s), and above six sigma of the present vibration, in two samples running, in four that follow from each other when they may be garbage; at once when two samples running are above it by themselves and from one side, and, where no contact is expected, when three samples of the chip running agree on 4 g that is no vibration and does not come from above | disarmed |
+//! | `STRUCK` | a blow from above on a vehicle that is upright | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, in four that follow from each other when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch, as far as the motors can make it, that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, such a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
 //! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s | disarmed |
-//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 20 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
-//! | `IMU_FAULTY` | the inertial sensor does not measure: stuck, at full scale, garbage for more than 50 ms; on the ground a force that is not gravity | disarmed |
+//! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 50 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
+//! | `IMU_FAULTY` | the gyro does not measure: stuck or at full scale, or samples are garbage for more than 50 ms; on the ground a force that is not gravity | disarmed |
+//! | `ACCEL_FAULTY` | the accelerometer is stuck or at full scale, and the gyro is not | disarmed |
 //! | `FORCE_IMPLAUSIBLE` | in the air, a specific force that is neither near gravity nor what thrust and drag make, in the mean over 0.4 s and for a second | disarmed |
 //! | `IMU_NOISY` | more than one inertial sample in 25 is garbage, or six close together are | disarmed |
 //! | `COMM_LOST` | no command of any kind for 500 ms, or since power-on | with the next command |
@@ -32,8 +34,9 @@
 //!
 //! | fault | found after |
 //! |---|---|
-//! | inertial sensor stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
-//! | samples that are not finite, silence | 20 ms; motors off within 25 ms |
+//! | inertial sensor or its gyro stuck, zero, one axis stuck | 50 ms; motors off within 60 ms |
+//! | accelerometer stuck, zero, one axis stuck | 50 ms; it lands |
+//! | samples that are not finite, silence | 50 ms; motors off within 55 ms |
 //! | full scale, garbage for good | 10 ms, 53 ms |
 //! | spikes in one sample of five | 0.1 s; it lands |
 //! | scale of a half or less, of both | a second, where it still flies then; it lands |
@@ -59,6 +62,7 @@ mod motion;
 mod motors;
 mod power;
 mod resting;
+mod struck;
 
 pub use config::{FailsafeConfig, WEAK_SHARE};
 pub use following::{Following, FollowingConfig};
@@ -67,7 +71,7 @@ pub use resting::{Resting, RestingConfig};
 
 use attitude::AttitudeMonitor;
 use force::ForceMonitor;
-use imu::ImuMonitor;
+use imu::{ImuMonitor, ImuVerdict};
 use lift::LiftMonitor;
 use motion::{Contact, MotionMonitor};
 use motors::MotorMonitor;
@@ -91,7 +95,7 @@ use stampfly_types::{Instant, Stamped};
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
 /// // The sensor says nothing any more.
 /// let quiet = FailsafeInput { imu: &[], ..quiet };
-/// assert!(failsafe.step(Instant::from_micros(30_000), &quiet).active.contains(Alerts::IMU_LOST));
+/// assert!(failsafe.step(Instant::from_micros(60_000), &quiet).active.contains(Alerts::IMU_LOST));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -127,6 +131,8 @@ const LATCHED: Alerts = Alerts::IMPACT
     .with(Alerts::MOTOR_LOST)
     .with(Alerts::NO_LIFT)
     .with(Alerts::FORCE_IMPLAUSIBLE)
+    .with(Alerts::ACCEL_FAULTY)
+    .with(Alerts::STRUCK)
     .with(Alerts::IMU_NOISY);
 
 impl Default for Failsafe {
@@ -221,7 +227,7 @@ impl Failsafe {
         let phase = input.flight_status.phase;
         let rate = if phase == FlightPhase::Flip { self.config.flip_rate } else { self.config.rate };
         let (found, suspect) = self.motion.step(&self.config, *at, imu, contact, rate);
-        let [mut faulty, noisy] = self.imu.step(&self.config, imu, suspect);
+        let ImuVerdict { mut faulty, accel_faulty, noisy } = self.imu.step(&self.config, imu, suspect);
         let mut implausible = false;
         if !suspect {
             self.attitude.add(&self.config, imu);
@@ -229,10 +235,17 @@ impl Failsafe {
             let known = !self.active.intersects(unknown);
             let unexplained = self.force.step(&self.config, *at, imu, input, known);
             let stands = phase == FlightPhase::IdleGround;
-            faulty |= unexplained && stands;
-            implausible = unexplained && !stands;
+            // A force that is not measured contradicts nothing.
+            let felt = !accel_faulty && !self.active.contains(Alerts::ACCEL_FAULTY);
+            faulty |= unexplained && stands && felt;
+            implausible = unexplained && !stands && felt;
         }
-        found.set(Alerts::IMU_FAULTY, faulty).set(Alerts::IMU_NOISY, noisy).set(Alerts::FORCE_IMPLAUSIBLE, implausible)
+        let found = struck::judged(found, input, &self.motion.force());
+        found
+            .set(Alerts::IMU_FAULTY, faulty)
+            .set(Alerts::ACCEL_FAULTY, accel_faulty && !faulty)
+            .set(Alerts::IMU_NOISY, noisy)
+            .set(Alerts::FORCE_IMPLAUSIBLE, implausible)
     }
 }
 

@@ -12,7 +12,9 @@ use crate::pilot::Transmitter;
 use crate::stop_button::StopButton;
 use crate::transitions::is_airborne;
 use stampfly_types::Instant;
-use stampfly_types::messages::{ArmBlocks, ButtonGesture, CommandSource, EstimatorCommand, FlightPhase, FlightStatus};
+use stampfly_types::messages::{
+    Alerts, ArmBlocks, ButtonGesture, CommandSource, EstimatorCommand, FlightPhase, FlightStatus,
+};
 
 /// What the machine decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -136,6 +138,7 @@ impl ModeMachine {
             estimator: EstimatorCommand {
                 on_ground: matches!(state.phase, FlightPhase::IdleGround | FlightPhase::Armed),
                 flying: is_airborne(state.phase) && !rests,
+                accel_faulty: facts.alerts.contains(Alerts::ACCEL_FAULTY),
                 origin_resets: state.origin_resets,
                 full_resets: state.full_resets,
             },

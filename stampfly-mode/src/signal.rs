@@ -62,6 +62,8 @@ const FAULT: Alerts = Alerts::IMU_LOST
     .with(Alerts::MOTOR_RUNS)
     .with(Alerts::NO_LIFT)
     .with(Alerts::FORCE_IMPLAUSIBLE)
+    .with(Alerts::ACCEL_FAULTY)
+    .with(Alerts::STRUCK)
     .with(Alerts::IMU_NOISY);
 /// What a person has to look at before the vehicle flies again.
 const ERROR: ArmBlocks = ArmBlocks::CRASHED.with(ArmBlocks::CUT_OFF).with(ArmBlocks::SELF_TEST);

@@ -16,7 +16,9 @@ pub const LAND: Alerts = Alerts::CRITICAL_BATTERY
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::MOTOR_WEAK)
     .with(Alerts::IMU_NOISY)
-    .with(Alerts::FORCE_IMPLAUSIBLE);
+    .with(Alerts::FORCE_IMPLAUSIBLE)
+    .with(Alerts::ACCEL_FAULTY)
+    .with(Alerts::STRUCK);
 
 /// Alerts with which a vehicle does not turn over: something is wrong with what it would need for it.
 pub const NO_FLIP: Alerts = LAND

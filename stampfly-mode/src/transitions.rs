@@ -72,14 +72,15 @@ impl Event {
             Self::Stop => {
                 "ARMED: arm switch off, `Disarm`, or armed for too long. TAKEOFF, FLYING: arm switch off in a manual mode. TAKEOFF: `NO_LIFT`. \
                  LANDING: arm switch off or `Disarm` at the ground, a second deliberate switch-off of the pilot whose switch \
-                 began the landing, a landing that takes too long, or `FORCE_IMPLAUSIBLE` below `standing_height`"
+                 began the landing, a landing that takes too long, or `FORCE_IMPLAUSIBLE` or \
+                 `ACCEL_FAULTY` below `standing_height`"
             }
             Self::Touchdown => "the land detector is sure",
             Self::Land => {
                 "`Land` or `Disarm` from any program, arm switch off in a mode that holds height, link lost for too long (at \
                  once without height), height lost for too long, horizontal velocity lost for too long without a pilot, a \
                  take-off that takes too long, after a flip when it is level, or `CRITICAL_BATTERY`, \
-                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`, `FORCE_IMPLAUSIBLE`"
+                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`, `FORCE_IMPLAUSIBLE`, `ACCEL_FAULTY`, `STRUCK`"
             }
             Self::Flip => {
                 "a `Flip` of any direction, while a program flies in a mode that holds height: level, at rest, above `flip_height`, \

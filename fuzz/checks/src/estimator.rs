@@ -44,8 +44,9 @@ pub fn estimator_stream(data: &[u8]) {
             5 => {
                 let flags = input.byte();
                 let [origin_resets, full_resets] = [u32::from(flags >> 2 & 1), u32::from(flags >> 3 & 1)];
-                let (on_ground, flying) = (flags & 1 != 0, flags & 2 != 0);
-                eskf.command(now, &EstimatorCommand { on_ground, flying, origin_resets, full_resets });
+                let (on_ground, flying, accel_faulty) = (flags & 1 != 0, flags & 2 != 0, flags & 16 != 0);
+                let command = EstimatorCommand { on_ground, flying, accel_faulty, origin_resets, full_resets };
+                eskf.command(now, &command);
             }
             6 => eskf.initialize(now, &calibration),
             248 => _ = eskf.fuse_position(now, &input.vector(20.0), &input.vector(1.0)),

@@ -23,9 +23,9 @@ use std::sync::OnceLock;
 /// Edits of one input.
 const EDITS: usize = 12;
 /// Instants are earlier by less than this, ms. The time of the flight band is that of its sample, so a vehicle cannot know that all
-/// its inertial samples are older than the 27.5 ms that `I7` allows.
+/// its inertial samples are older than the 57.5 ms that `I7` allows.
 const LATE: u64 = 20;
-/// Longest time without a turn, turns of the simulation: 20 ms. The cut-off that comes after 25 ms is no part of this.
+/// Longest time without a turn, turns of the simulation: 20 ms. The cut-off that comes after 60 ms is no part of this.
 const HELD_UP: usize = 8;
 
 /// What a vehicle was given.

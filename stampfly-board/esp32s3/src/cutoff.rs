@@ -19,15 +19,14 @@ use esp_hal::peripherals::TIMG1;
 use esp_hal::time::Duration;
 use esp_hal::timer::PeriodicTimer;
 use esp_hal::timer::timg::{MwdtStage, MwdtStageAction, TimerGroup, Wdt};
+use stampfly_board::airframe::CUT_OFF;
 use stampfly_board::messages::CutoffState;
 use stampfly_board::topics::CutoffStateTx;
 use stampfly_drivers::Timebase;
 use stampfly_flight::Watchdog;
 use static_cell::StaticCell;
 
-/// Motors that are not confirmed for this long are stopped.
-const TIMEOUT: stampfly_types::Duration = stampfly_types::Duration::from_millis(25);
-/// How often the timer looks. Motors turn for at most `TIMEOUT` and this after the last confirmation.
+/// How often the timer looks. Motors turn for at most [`CUT_OFF`] and this after the last confirmation.
 const PERIOD: Duration = Duration::from_millis(1);
 
 /// Timeout of the chip's watchdog while motors may turn.
@@ -36,7 +35,7 @@ const IN_FLIGHT: Duration = Duration::from_millis(100);
 const ON_THE_GROUND: Duration = Duration::from_secs(4);
 
 /// Shared by the motors, which feed it, the timer's interrupt and the panic handler.
-static WATCHDOG: Watchdog = Watchdog::new(TIMEOUT);
+static WATCHDOG: Watchdog = Watchdog::new(CUT_OFF);
 /// For the interrupt only.
 static WATCH: AtomicPtr<Watch> = AtomicPtr::new(null_mut());
 

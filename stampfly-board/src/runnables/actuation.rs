@@ -1,6 +1,6 @@
 //! Actuation: thrust and torque in, motor duty out. The last place where a motor can be kept still.
 
-use crate::airframe::MIXER;
+use crate::airframe::{LAST_RATES, MIXER};
 use crate::config::VehicleConfig;
 use crate::console::TEST_DUTY;
 use crate::topics::ActuationEnds;
@@ -9,8 +9,8 @@ use stampfly_control::{MotorStage, MultirotorMixer};
 use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Duration, Instant};
 
-/// Demand older than this turns no motor: the controller has stopped. Ten periods of the loop.
-const STALE_DEMAND: Duration = Duration::from_millis(25);
+/// Demand older than this turns no motor: the controller has stopped.
+const STALE_DEMAND: Duration = LAST_RATES;
 /// A battery reading older than this counts as none: fourteen periods of the monitor.
 const STALE_POWER: Duration = Duration::from_secs(1);
 

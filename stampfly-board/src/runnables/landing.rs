@@ -4,6 +4,7 @@ use crate::config::VehicleConfig;
 use crate::topics::LandingEnds;
 use stampfly_bus::{Activation, Runnable};
 use stampfly_mode::{LandingInput, TakeoffLanding};
+use stampfly_types::messages::Alerts;
 
 /// Take-off and landing manager: the estimate in, contact with the ground out.
 #[derive(Clone, Debug)]
@@ -26,6 +27,7 @@ impl Runnable for Landing {
     fn run(&mut self, activation: &mut Activation, ends: &mut LandingEnds<'_>) {
         let input = LandingInput {
             estimate: ends.estimate_state.get(),
+            felt: !ends.system_alert.get().active.contains(Alerts::ACCEL_FAULTY),
             phase: ends.flight_status.get().phase,
             setpoint: ends.setpoint.get(),
             demand: ends.control_output.get(),

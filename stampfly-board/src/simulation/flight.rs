@@ -13,6 +13,7 @@ use super::sensing::{self, Healths, Others, Sensing, Shared};
 use super::settings::Settings;
 use super::setup::Setup;
 use super::watch::Watch;
+use crate::airframe::CUT_OFF;
 use crate::console::Profile;
 use crate::messages::{ButtonContact, CutoffState};
 use crate::schedule::{ACTIVATIONS, Runnables};
@@ -215,9 +216,6 @@ impl vehicle::Surroundings for Surroundings {
         }
     }
 }
-
-/// Motors that are not confirmed for this long are stopped, as by the firmware.
-const CUT_OFF: Duration = Duration::from_millis(25);
 
 /// The world during a flight, and what is watched of it.
 pub struct Around<'a> {

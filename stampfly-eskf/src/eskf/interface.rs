@@ -1,6 +1,7 @@
 //! The filter as an [`Estimator`]: initialise, command, predict, estimate.
 
 use super::gate::Sensor;
+use super::unfelt::{UNFELT_NOISE, unfelt};
 use super::*;
 use crate::aid::airspeed::Wind;
 
@@ -65,6 +66,9 @@ impl Estimator for Eskf {
             }
             self.anchor = None;
         }
+        if command.accel_faulty && !previous.accel_faulty {
+            self.begin_unfelt();
+        }
         match (command.on_ground, self.anchor) {
             (true, None) => self.anchor = Some(self.state.position),
             (false, Some(anchor)) => {
@@ -97,7 +101,11 @@ impl Estimator for Eskf {
         if bridged.is_some() {
             self.status.imu_refused = self.status.imu_refused.wrapping_add(1);
         }
-        let imu = &bridged.unwrap_or(*imu);
+        let mut imu = bridged.unwrap_or(*imu);
+        if self.command.accel_faulty {
+            imu.accel = unfelt();
+        }
+        let imu = &imu;
         self.now = at;
         if dt > MAX_STEP {
             self.reset_history();
@@ -119,8 +127,9 @@ impl Estimator for Eskf {
         if due {
             let [force, rate] = &self.vibration;
             let [force, rate] = [force.mean_square() * motion.dt, rate.mean_square() * motion.dt];
+            let unfelt = if self.command.accel_faulty { UNFELT_NOISE * UNFELT_NOISE } else { 0.0 };
             let noise = ProcessNoise {
-                velocity: self.noise.velocity + self.config.accel_vibration * force,
+                velocity: self.noise.velocity + self.config.accel_vibration * force + unfelt,
                 attitude: self.noise.attitude + self.config.gyro_vibration * rate,
                 ..self.noise
             };
@@ -147,7 +156,7 @@ impl Estimator for Eskf {
             }
             self.apply_pseudo_measurements(accel, dt * PSEUDO_MEASUREMENT_DIVIDER as f32);
         }
-        if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() {
+        if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() && !self.command.accel_faulty {
             self.felt.add(&imu.accel);
             // The mean of the samples since the covariance was last propagated says what each of them does.
             if due && let Some((accel, count)) = self.felt.take() {

@@ -187,7 +187,8 @@ impl Eskf {
             }
         } else {
             let shaken = self.vibration[0].mean_square();
-            let known = self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof) && shaken <= SHAKEN;
+            let felt = shaken <= SHAKEN && !self.command.accel_faulty;
+            let known = felt && self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof);
             let shaken = known.then_some(shaken);
             let turning = [turn.y, -turn.x];
             match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, shaken) {

@@ -58,9 +58,9 @@ const KINDS: [&[Alerts]; 15] = [
     // The same, and the estimator starts anew.
     &[Alerts::ESTIMATE_DIVERGED],
     // Landing at once.
-    &[Alerts::MOTOR_WEAK],
-    // The same, and motors off when it stands.
-    &[Alerts::FORCE_IMPLAUSIBLE],
+    &[Alerts::MOTOR_WEAK, Alerts::STRUCK],
+    // The same, motors off when it stands, and no arming.
+    &[Alerts::FORCE_IMPLAUSIBLE, Alerts::ACCEL_FAULTY],
     // A take-off is over.
     &[Alerts::NO_LIFT],
     // A take-off is broken off, and no flip.

@@ -150,7 +150,8 @@ impl Default for FailsafeConfig {
             weak_pitch: f32::INFINITY,
             weak_motor_time: Duration::from_millis(100),
             imu_degraded: Duration::from_millis(10),
-            imu_lost: Duration::from_millis(20),
+            // On its last rates a palm-sized vehicle flies for 50 ms: see `imu`.
+            imu_lost: Duration::from_millis(50),
             link_silence: Duration::from_millis(500),
             battery_low: 3.4,
             battery_critical: 3.0,

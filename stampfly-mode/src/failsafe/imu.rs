@@ -6,12 +6,15 @@
 //! | one axis stays at full scale | `stuck_samples` |
 //! | many samples ask for an angular acceleration that no body has ([`motion`](super::motion)) | 21 of them in a row, or 42 of 84 |
 //!
-//! With fewer such samples, but six close together or more than one in 25, it is *noisy*: the vehicle can still fly, and lands.
+//! The first two are told apart for gyro and accelerometer: without the first a vehicle does not fly, without the second
+//! it lands. With fewer such samples as in the third row, but six close together or more than one in 25, the sensor is
+//! *noisy*: the vehicle can still fly, and lands.
 //!
 //! Samples that are not finite never get here: they count as silence. Not for small errors of scale and bias, which
 //! the estimator finds.
 
 use super::config::FailsafeConfig;
+use stampfly_types::Vec3;
 use stampfly_types::messages::ImuData;
 
 /// Suspect samples count this much against one that is not: a third of them adds up.
@@ -55,29 +58,48 @@ impl Axis {
 pub(super) struct ImuMonitor {
     accel: [Axis; 3],
     gyro: [Axis; 3],
+    /// The longest run of each.
+    accel_runs: u32,
+    gyro_runs: u32,
     suspects: u32,
     noise: u32,
 }
 
+/// What the samples say about the sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct ImuVerdict {
+    /// It does not measure, or its gyro does not.
+    pub faulty: bool,
+    /// Its accelerometer does not measure.
+    pub accel_faulty: bool,
+    /// Some of its samples are garbage.
+    pub noisy: bool,
+}
+
 impl ImuMonitor {
-    /// Takes a sample. `suspect` says that it asks for the impossible. Does the sensor measure nothing, and is it noisy?
-    pub(super) fn step(&mut self, config: &FailsafeConfig, imu: &ImuData, suspect: bool) -> [bool; 2] {
-        let mut longest = 0;
-        let sensors = [
-            (&mut self.accel, &imu.accel, config.accel_full_scale),
-            (&mut self.gyro, &imu.gyro, config.gyro_full_scale),
-        ];
+    /// Takes a sample. `suspect` says that it asks for the impossible.
+    pub(super) fn step(&mut self, config: &FailsafeConfig, imu: &ImuData, suspect: bool) -> ImuVerdict {
         // Garbage has a count of its own.
-        for (axes, values, full_scale) in sensors.into_iter().filter(|_| !suspect) {
-            for (axis, value) in axes.iter_mut().zip(values.to_array()) {
-                longest = longest.max(axis.step(value, full_scale * FULL));
-            }
+        if !suspect {
+            self.accel_runs = longest(&mut self.accel, &imu.accel, config.accel_full_scale);
+            self.gyro_runs = longest(&mut self.gyro, &imu.gyro, config.gyro_full_scale);
         }
         let count = |count: u32, weight: u32, limit: u32| {
             if suspect { (count + weight).min(limit) } else { count.saturating_sub(1) }
         };
         self.suspects = count(self.suspects, SUSPECT, 2 * SUSPECTS);
         self.noise = count(self.noise, NOISE, 2 * NOISY);
-        [longest >= config.stuck_samples || self.suspects >= SUSPECTS, self.noise >= NOISY]
+        ImuVerdict {
+            faulty: self.gyro_runs >= config.stuck_samples || self.suspects >= SUSPECTS,
+            accel_faulty: self.accel_runs >= config.stuck_samples,
+            noisy: self.noise >= NOISY,
+        }
     }
+}
+
+/// The longest run of a sensor's axes, this sample included.
+fn longest(axes: &mut [Axis; 3], values: &Vec3, full_scale: f32) -> u32 {
+    axes.iter_mut()
+        .zip(values.to_array())
+        .fold(0, |longest, (axis, value)| longest.max(axis.step(value, full_scale * FULL)))
 }

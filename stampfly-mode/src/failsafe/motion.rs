@@ -202,6 +202,11 @@ impl MotionMonitor {
         (if sharp { found.with(Alerts::IMPACT) } else { found }, suspect)
     }
 
+    /// The specific force over the length of a blow, body FRD, m/s².
+    pub(super) fn force(&self) -> Vec3 {
+        self.believed.blow.unwrap_or_default()
+    }
+
     /// Does a sharp blow begin in this sample? Where the ground may push, nothing is one: its push is as sharp. Nor does one come from
     /// above: a vehicle that climbs against a ceiling comes down on its motors.
     fn is_sharp(&mut self, config: &FailsafeConfig, turned: Before, imu: &ImuData, contact: Contact) -> bool {

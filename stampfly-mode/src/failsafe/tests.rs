@@ -5,6 +5,7 @@ mod force;
 mod inertial;
 mod lift;
 mod motors;
+mod struck;
 mod tipping;
 
 use super::*;

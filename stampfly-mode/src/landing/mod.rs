@@ -16,7 +16,8 @@
 //! A vehicle whose specific force does not follow its thrust stands. So does one that has lost half of its thrust, in whatever
 //! way, and none of its specific force, and one that does not sink with half of the thrust that carries its weight. Neither height nor climb rate can make a vehicle in the air count as landed. One that
 //! falls although its height says that it stands gets its thrust back, and comes down blind, as one without height and climb
-//! rate does.
+//! rate does. One that does not feel its specific force is not known to stand: the [machine](crate::machine) stops its motors
+//! by its height.
 
 mod blind;
 mod config;
@@ -35,13 +36,15 @@ use stampfly_types::Instant;
 use stampfly_types::messages::{
     ControlOutput, FlightPhase, GroundContact, LandDetected, MotorOutput, Setpoint, StateEstimate,
 };
-use weight::WeightTest;
+use weight::{Answers, WeightTest};
 
 /// What the manager looks at.
 #[derive(Clone, Copy, Debug)]
 pub struct LandingInput<'a> {
     /// The estimate.
     pub estimate: &'a StateEstimate,
+    /// Its specific force is measured.
+    pub felt: bool,
     /// The present flight phase.
     pub phase: FlightPhase,
     /// The set-point one step ago.
@@ -73,6 +76,7 @@ impl LandingInput<'_> {
 /// let (mut landed_at, mut ceiling) = (None, 1.0f32);
 /// for k in 0..1000u64 {
 ///     let land_detected = manager.step(Instant::from_micros(2_500 * k), &LandingInput {
+///         felt: true,
 ///         estimate: &estimate, phase: FlightPhase::Landing, setpoint: &Setpoint::default(),
 ///         demand: &ControlOutput { thrust: 4.9 * ceiling.min(1.0), ..Default::default() },
 ///         unmet: 0.0,
@@ -122,7 +126,11 @@ impl TakeoffLanding {
             }
         }
         let estimate = input.estimate;
-        let weight = self.weight.step(now, -estimate.specific_force.z, input.thrust(), self.is_testing);
+        let weight = if input.felt {
+            self.weight.step(now, -estimate.specific_force.z, input.thrust(), self.is_testing)
+        } else {
+            Answers::UNKNOWN
+        };
         let seen = Seen {
             config: &self.config,
             phase: input.phase,

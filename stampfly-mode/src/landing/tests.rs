@@ -76,6 +76,7 @@ impl Landing {
             let land_detected = manager.step(
                 Instant::from_micros(2_500 * k),
                 &LandingInput {
+                    felt: true,
                     estimate: &estimate,
                     phase: FlightPhase::Landing,
                     setpoint: &Setpoint::default(),
@@ -182,6 +183,7 @@ fn hovering_low_in_flight_is_never_landed() {
     };
     for k in 0..8_000 {
         let input = LandingInput {
+            felt: true,
             estimate: &estimate,
             phase: FlightPhase::Flying,
             setpoint: &Setpoint::default(),
@@ -199,6 +201,7 @@ fn a_vehicle_that_is_held_never_completes_its_take_off() {
     let held = everything(0.0, 0.0, 0.0);
     for k in 0..8_000 {
         let input = LandingInput {
+            felt: true,
             estimate: &held,
             phase: FlightPhase::TakeOff,
             setpoint: &Setpoint::default(),
@@ -222,7 +225,8 @@ fn stages(manager: &mut TakeoffLanding, steps: &[(FlightPhase, f32, f32)], valid
             ..Default::default()
         };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
-        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input =
+            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
         manager.step(Instant::from_micros(2_500 * k as u64), &input);
         told.push(manager.stage().to_string());
     }
@@ -260,7 +264,8 @@ fn a_take_off_counts_from_its_phase_and_not_from_arming() {
     let mut step = |seconds, phase, height| {
         let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput::default());
-        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input =
+            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
         manager.step(Instant::from_secs(seconds), &input)
     };
     assert_eq!(step(0, FlightPhase::Armed, 0.0).thrust_ceiling, f32::MAX);
@@ -309,7 +314,14 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
             };
             let setpoint = Setpoint::default();
             let phase = if k < 200 { FlightPhase::Flying } else { FlightPhase::Landing };
-            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+            let input = LandingInput {
+                felt: true,
+                estimate: &estimate,
+                phase,
+                setpoint: &setpoint,
+                demand: &demand,
+                unmet: 0.0,
+            };
             ceiling = manager.step(now, &input).thrust_ceiling;
             if sink_rate > config.descent + 0.1 {
                 fast.get_or_insert(now);
@@ -349,6 +361,7 @@ fn lands(manager: &mut TakeoffLanding, steps: u64, height: Option<f32>, sink_rat
     };
     let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
     let input = LandingInput {
+        felt: true,
         estimate: &estimate,
         phase: FlightPhase::Landing,
         setpoint: &setpoint,
@@ -453,6 +466,7 @@ fn complete(away: f32, path: f32, speed: f32) -> Option<f32> {
             Setpoint { position: Vec3::new(0.0, 0.0, -0.5), velocity: Vec3::new(0.0, 0.0, path), ..Default::default() };
         let demand = ControlOutput { thrust: 1.0, ..Default::default() };
         let input = LandingInput {
+            felt: true,
             estimate: &estimate,
             phase: FlightPhase::TakeOff,
             setpoint: &setpoint,
@@ -498,7 +512,8 @@ fn contact(share: f32, hover_thrust: f32, sensors: SensorMask, millis: u64) -> G
         let phase = if now == 0 { FlightPhase::Armed } else { FlightPhase::TakeOff };
         let thrust = if now == 0 { 0.0 } else { share * 0.36 };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
-        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input =
+            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
         contact = manager.step(Instant::from_millis(now), &input).contact;
     }
     contact
@@ -530,7 +545,8 @@ fn lands_in_a_hand(hover_thrust: f32, thrust: f32, force: f32, sink_rate: Option
     (0u64..1_600).any(|step| {
         let phase = if step < 800 { FlightPhase::Flying } else { FlightPhase::Landing };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
-        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input =
+            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
         manager.step(Instant::from_micros(2_500 * step), &input).landed
     })
 }
@@ -561,7 +577,8 @@ fn lands_in_rising_air(asked: f32, unmet: f32) -> bool {
         let thrust = if flies { asked } else { 0.29 };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
         let unmet = if flies { unmet } else { 0.0 };
-        let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet };
+        let input =
+            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet };
         manager.step(Instant::from_micros(2_500 * step), &input).landed
     })
 }
@@ -604,7 +621,14 @@ fn a_touch_that_is_felt_ends_the_ramp() {
             };
             let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
             let setpoint = Setpoint::default();
-            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+            let input = LandingInput {
+                felt: true,
+                estimate: &estimate,
+                phase,
+                setpoint: &setpoint,
+                demand: &demand,
+                unmet: 0.0,
+            };
             ceiling = manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling;
             ceiling
         };
@@ -624,7 +648,14 @@ fn a_blind_landing_gives_up_more_thrust_when_it_breaks_off_a_take_off() {
         let estimate = nothing(0.0, 0.0, 0.0);
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
         let mut step = |k: u64, phase| {
-            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+            let input = LandingInput {
+                felt: true,
+                estimate: &estimate,
+                phase,
+                setpoint: &setpoint,
+                demand: &demand,
+                unmet: 0.0,
+            };
             manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling
         };
         step(0, phase);
@@ -649,7 +680,14 @@ fn what_something_carries_has_landed_whatever_the_estimate_says() {
             };
             let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: share, ..Default::default() });
             let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
-            let input = LandingInput { estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+            let input = LandingInput {
+                felt: true,
+                estimate: &estimate,
+                phase,
+                setpoint: &setpoint,
+                demand: &demand,
+                unmet: 0.0,
+            };
             manager.step(Instant::from_micros(2_500 * k), &input).landed
         })
     };

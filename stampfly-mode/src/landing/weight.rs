@@ -97,6 +97,18 @@ pub struct Answers {
     pub force: f32,
 }
 
+impl Answers {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        quick: Support::Unknown,
+        steady: Support::Unknown,
+        is_carried: false,
+        is_struck: false,
+        thrust: 0.0,
+        force: 0.0,
+    };
+}
+
 /// Filtered thrust and specific force, and what both were before thrust was taken away.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -120,14 +132,7 @@ impl WeightTest {
     /// Takes one step's specific force upwards, m/s², and thrust that the motors were told to make,
     /// N. `testing`: thrust is being taken away, the reference stays.
     pub fn step(&mut self, now: Instant, force: f32, thrust: f32, testing: bool) -> Answers {
-        let unknown = Answers {
-            quick: Support::Unknown,
-            steady: Support::Unknown,
-            is_carried: false,
-            is_struck: false,
-            thrust: 0.0,
-            force: 0.0,
-        };
+        let unknown = Answers::UNKNOWN;
         if !(force.is_finite() && thrust.is_finite()) {
             return unknown;
         }

@@ -65,7 +65,11 @@ fn heartbeat(_: Instant, own: &Own, view: &View<'_>) -> Option<Said> {
     base.set(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED, status.commander == CommandSource::Guided);
     base.set(MavModeFlag::MAV_MODE_FLAG_MANUAL_INPUT_ENABLED, status.commander == CommandSource::Pilot);
     let emergency = Alerts::IMPACT | Alerts::IMU_LOST | Alerts::IMU_FAULTY | Alerts::TUMBLED | Alerts::MOTOR_LOST;
-    let critical = Alerts::COMM_LOST | Alerts::CRITICAL_BATTERY | Alerts::ESTIMATE_DIVERGED;
+    let critical = Alerts::COMM_LOST
+        | Alerts::CRITICAL_BATTERY
+        | Alerts::ESTIMATE_DIVERGED
+        | Alerts::ACCEL_FAULTY
+        | Alerts::STRUCK;
     let system_status = match status.phase {
         FlightPhase::Init if status.blocks.contains(ArmBlocks::CALIBRATING) => MavState::MAV_STATE_CALIBRATING,
         FlightPhase::Init => MavState::MAV_STATE_BOOT,
@@ -98,7 +102,7 @@ fn sys_status(_: Instant, _: &Own, view: &View<'_>) -> Option<Said> {
         (
             view.imu().is_some(),
             MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_3D_ACCEL,
-            Alerts::IMU_LOST | Alerts::IMU_FAULTY,
+            Alerts::IMU_LOST | Alerts::IMU_FAULTY | Alerts::ACCEL_FAULTY,
         ),
         (view.mag().is_some(), MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_3D_MAG, Alerts::NONE),
         (view.baro().is_some(), MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Alerts::BARO_LOST),

@@ -121,6 +121,8 @@ message! {
         on_ground: bool,
         /// Its propellers carry it.
         flying: bool,
+        /// The accelerometer does not measure: what it says is no specific force.
+        accel_faulty: bool,
         /// A change of this number asks for position and velocity to be set to zero.
         origin_resets: u32,
         /// A change of this number asks for a full new start from calibration.

@@ -187,7 +187,7 @@ message_flags! {
     pub struct Alerts {
         /// No authentic command for too long, or never one.
         COMM_LOST = 0,
-        /// Acceleration beyond the impact limit.
+        /// A blow that does not come from above: it has crashed.
         IMPACT = 1,
         /// Battery at the warning level.
         LOW_BATTERY = 2,
@@ -201,7 +201,7 @@ message_flags! {
         GYRO_ANOMALY = 6,
         /// No inertial sample for 10 ms.
         IMU_DEGRADED = 7,
-        /// No inertial sample for 20 ms: motors off.
+        /// No inertial sample for 50 ms: motors off.
         IMU_LOST = 8,
         /// Upside down or tumbling.
         TUMBLED = 9,
@@ -239,6 +239,10 @@ message_flags! {
         NO_LIFT = 25,
         /// The specific force is not what thrust and drag make.
         FORCE_IMPLAUSIBLE = 26,
+        /// The accelerometer does not measure, and the gyro does: the vehicle lands.
+        ACCEL_FAULTY = 27,
+        /// It was struck from above, and lands.
+        STRUCK = 28,
     }
 }
 

@@ -3,9 +3,9 @@
 //!
 //! | found in inertial samples | alert | what follows |
 //! |---|---|---|
-//! | a blow from the front, the side or above; from below with more sink than the wheels bear | `IMPACT` | it has crashed |
+//! | a blow from the front, the side or above; from below with more sink than the wheels bear | `IMPACT`, `STRUCK` | it has crashed |
 //! | a rate that no surface makes | `GYRO_ANOMALY` | it has crashed |
-//! | stuck, at full scale, garbage | `IMU_FAULTY` | its attitude is not known |
+//! | stuck, at full scale, garbage | `IMU_FAULTY`, `ACCEL_FAULTY` | its attitude is not known |
 //! | silent | `IMU_LOST` | the estimate is too old to fly by, which nothing else has to say |
 //!
 //! Attitudes say nothing here: an aeroplane may be in any. What lies, and what has a wing tip on
@@ -17,7 +17,9 @@ use stampfly_types::messages::{Alerts, StateEstimate, Validity};
 use stampfly_types::{Duration, GRAVITY};
 
 /// The propeller stops, and does not start again by itself.
-pub const BLOW: Alerts = Alerts::IMPACT.with(Alerts::GYRO_ANOMALY);
+pub const BLOW: Alerts = Alerts::IMPACT.with(Alerts::STRUCK).with(Alerts::GYRO_ANOMALY);
+/// The inertial sensor shows no attitude.
+pub const BLIND: Alerts = Alerts::IMU_FAULTY.with(Alerts::ACCEL_FAULTY);
 /// A blow, m/s². Along and across, thrust, brakes and tyres make a weight at most; at cruise the
 /// wing makes 3.1 of them before it stalls, and a landing's wheels push from below, which counts
 /// for nothing.

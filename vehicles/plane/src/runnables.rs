@@ -18,7 +18,7 @@ use stampfly_fixed_wing::messages::{Home, MeasuredHeights};
 use stampfly_fixed_wing::{Config, PathManager, Sensed, Watch, Watched};
 use stampfly_mode::FailsafeInput;
 use stampfly_param::ParameterSet;
-use stampfly_types::messages::{Alerts, ControlOutput, SelfTestVerdict};
+use stampfly_types::messages::{ControlOutput, SelfTestVerdict};
 use stampfly_types::{Duration, Instant, Stamped};
 
 /// An estimate that is older is none: ten samples were missed.
@@ -136,7 +136,7 @@ impl Runnable for Control {
             self.config = autopilot::config(ends.parameters.get());
         }
         let demand = ends.demand.get();
-        let faulty = ends.system_alert.get().active.contains(Alerts::IMU_FAULTY);
+        let faulty = ends.system_alert.get().active.intersects(protection::BLIND);
         let (motor, servos) = match ends.estimate_state.fresh(now, OLD).filter(|_| !faulty) {
             Some(state) => {
                 let flown = self.autopilot.step(dt, demand, state, ends.air.get(), &self.config);
@@ -173,7 +173,7 @@ impl Runnable for Watching {
         }
         let status = ends.path_status.get();
         let alerts = ends.system_alert.get().active;
-        let faulty = alerts.contains(Alerts::IMU_FAULTY);
+        let faulty = alerts.intersects(protection::BLIND);
         let watched = Watched {
             // What does not measure shows no attitude.
             estimate: ends.estimate_state.fresh(now, OLD).filter(|_| !faulty),

@@ -2,8 +2,8 @@
 //!
 //! | found | by | when |
 //! |---|---|---|
-//! | the inertial sensor is stuck, at full scale, garbage | [`Failsafe`] | `IMU_FAULTY` after 50 ms |
-//! | a blow that no touch-down makes | [`Failsafe`] | `IMPACT`, within 10 ms |
+//! | the inertial sensor is stuck, at full scale, garbage | [`Failsafe`] | `IMU_FAULTY`, `ACCEL_FAULTY` after 50 ms |
+//! | a blow that no touch-down makes | [`Failsafe`] | `IMPACT`, `STRUCK`, within 10 ms |
 //! | a rate that no stick asks for | [`Failsafe`] | `GYRO_ANOMALY`, within 10 ms |
 //! | in ANGLE, a lean far beyond every stick | [`Failsafe`] | `TUMBLED` after half a second |
 //! | it does not turn as its loops want it to | [`Following`] | `TUMBLED` after 0.4 s |
@@ -31,8 +31,8 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Stamped, Vec3, frame};
 
-/// Alerts that stop the motors.
-pub const CUT: Alerts = decision::CUT;
+/// Alerts that stop the motors. It has no landing, so what asks for one does, too.
+pub const CUT: Alerts = decision::CUT.with(Alerts::ACCEL_FAULTY).with(Alerts::STRUCK);
 /// Samples to a mean.
 const SAMPLES: u32 = 10;
 /// Of the chip: ±16 g and ±2000 °/s.

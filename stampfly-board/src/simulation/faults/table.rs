@@ -73,8 +73,8 @@ pub const FAULTS: &[FaultKind] =
             [0.1, 35.0],
             "what vibration makes to the end of the range",
         ),
-        plain("accel-stuck", Cut, "Accelerations repeat the last ones."),
-        plain("accel-zero", Cut, "Accelerations are zero."),
+        plain("accel-stuck", Landed, "Accelerations repeat the last ones."),
+        plain("accel-zero", Landed, "Accelerations are zero."),
         number("accel-bias", ("m/s^2", 2.0, -80.0, 80.0), Degraded, "The vertical acceleration is too high by this.")
             .sized(EitherWay, [0.1, 10.0], "half of the data sheet's offset to one gravity, after a blow")
             .above(2.0, Landed),
@@ -178,7 +178,7 @@ pub const FAULTS: &[FaultKind] =
         plain("pilot-nan", Landed, "The pilot's sticks are no numbers."),
         number("stall", ("ms", 20.0, 0.0, 10_000.0), Degraded, "The flight band does not run for this long.")
             .sized(Number, [2.5, 250.0], "one period of the loop to the longest flash write")
-            .above(24.0, Cut),
+            .above(48.0, Cut),
         plain("starve", Landed, "The background band does not run."),
     ];
 

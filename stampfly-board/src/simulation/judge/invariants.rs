@@ -8,7 +8,7 @@
 //! | `I4` | the estimate's numbers are finite, and its quaternion is a rotation within 1e-4 |
 //! | `I5` | phases change as [`transitions`] say |
 //! | `I6` | armed, and no command of the commander for 520 ms: the alert `COMM_LOST` |
-//! | `I7` | no inertial sample for 27.5 ms (20 ms, and three periods): the motors are off |
+//! | `I7` | no inertial sample for 57.5 ms (50 ms, and three periods): the motors are off |
 //! | `I9` | the instants of a topic never go back |
 //! | `I10` | 3 s, and 1 s for each 0.3 m of height, after an alert that demands landing: the motors are off |
 //!
@@ -24,8 +24,8 @@ use std::collections::BTreeSet;
 
 /// 500 ms, and 20 ms to notice.
 const COMM_SILENCE: Duration = Duration::from_millis(520);
-/// 20 ms, and three periods.
-const IMU_SILENCE: Duration = Duration::from_micros(27_500);
+/// 50 ms, and three periods.
+const IMU_SILENCE: Duration = Duration::from_micros(57_500);
 /// Of I10.
 const LAND_WITHIN: Duration = Duration::from_secs(3);
 /// Of I10, m/s.

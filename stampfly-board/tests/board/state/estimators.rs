@@ -28,6 +28,7 @@ fn fly<E: Estimator>(estimator: &mut E, k: u64, n: &mut Numbers) -> (StateEstima
     let command = EstimatorCommand {
         on_ground: k < 100,
         flying: k > 300,
+        accel_faulty: (900..950).contains(&k),
         origin_resets: u32::from(k > 550) + u32::from(k > 800),
         full_resets: u32::from(k > 580),
     };

@@ -102,8 +102,14 @@ fn landing_goes_on() {
         let estimate = StateEstimate { height, velocity: n.vector(0.05), valid: Validity::ALL, ..Default::default() };
         let setpoint = Setpoint { position: Vec3::new(0.0, 0.0, -0.5), ..Default::default() };
         let demand = ControlOutput { thrust: 0.25 + n.number(0.1), ..Default::default() };
-        let input =
-            LandingInput { estimate: &estimate, phase: phase_of(k), setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input = LandingInput {
+            felt: true,
+            estimate: &estimate,
+            phase: phase_of(k),
+            setpoint: &setpoint,
+            demand: &demand,
+            unmet: 0.0,
+        };
         manager.step(at(k), &input)
     });
 }

@@ -148,7 +148,7 @@ fn refused_transfers() {
 
 #[test]
 fn a_short_refusal_leaves_a_short_gap_in_the_inertial_samples() {
-    // Motors are cut after 25 ms without a sample. A period has passed when the fault begins, and a pause after its end.
+    // A period has passed when the fault begins, and a pause after its end.
     let (unavoidable, end) = (Duration::from_micros(5_200), Instant::from_millis(1_100));
     for refused in [1, 8, 18].map(Duration::from_millis) {
         for begin in (0..10).map(|n| BEGIN + Duration::from_micros(270 * n)) {

@@ -135,13 +135,13 @@ fn a_silent_inertial_sensor() {
             })
         });
         let took = seen.motors_off_after(since.get());
-        assert!((Duration::from_millis(17)..=Duration::from_millis(25)).contains(&took), "seed {seed}: {took}");
+        assert!((Duration::from_millis(47)..=Duration::from_millis(56)).contains(&took), "seed {seed}: {took}");
         let degraded = seen.alerts.iter().find(|(_, alerts)| alerts.contains(Alerts::IMU_DEGRADED)).expect("noticed").0;
         assert!(degraded.since(since.get()) <= Duration::from_millis(15), "seed {seed}: {degraded}");
     }
 }
 
-/// Less than 20 ms is noticed and flown through.
+/// Less than 50 ms is noticed and flown through.
 #[test]
 fn a_hiccup_of_the_inertial_sensor() {
     let (since, note) = instant();
@@ -150,7 +150,7 @@ fn a_hiccup_of_the_inertial_sensor() {
             hands.take_off().await;
             note.set(hands.clock.now());
             hands.imu_silent.set(true);
-            hands.sleep(0.015).await;
+            hands.sleep(0.045).await;
             hands.imu_silent.set(false);
             hands.sleep(2.0).await;
             hands.command(GuidedKind::Land);

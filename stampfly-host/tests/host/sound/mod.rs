@@ -27,6 +27,8 @@ use stampfly_types::{Duration, Instant, Vec3};
 
 /// What no sound vehicle is accused of.
 const CONVICTS: Alerts = Alerts::IMPACT
+    .with(Alerts::STRUCK)
+    .with(Alerts::ACCEL_FAULTY)
     .with(Alerts::GYRO_ANOMALY)
     .with(Alerts::TUMBLED)
     .with(Alerts::IMU_LOST)

@@ -48,6 +48,8 @@ fn options((mission, wind, gust, params, faults): (&str, f32, f32, &str, &str), 
 fn no_protection_speaks_while_nothing_has_crashed() {
     let seeds: u64 = std::env::var("FLIGHTS").map_or(1, |text| text.parse().expect("FLIGHTS is a number"));
     let said = Alerts::IMPACT
+        | Alerts::STRUCK
+        | Alerts::ACCEL_FAULTY
         | Alerts::GYRO_ANOMALY
         | Alerts::TUMBLED
         | Alerts::IMU_FAULTY

@@ -64,9 +64,9 @@ fn motors_that_turn_without_samples_or_after_their_time_to_land_are_found() {
     let mut flight = new();
     publish(&mut flight, Id::sensor_imu, Instant::from_millis(1000), &ImuData::default());
     flight.motors(true);
-    flight.see(Instant::from_millis(1027), 0.6);
+    flight.see(Instant::from_millis(1057), 0.6);
     assert!(flight.violations.is_empty());
-    flight.see(Instant::from_millis(1028), 0.6);
+    flight.see(Instant::from_millis(1058), 0.6);
     assert_eq!(flight.violations, BTreeSet::from(["I7"]));
 
     // 3 s, and 2 s for 0.6 m.
