@@ -2,7 +2,8 @@
 //!
 //! Everything that describes the log is kept: facts, parameters, formats, topics. Of the samples and activations only those between
 //! the two instants are. A mark says that something is missing before them, and so `stampfly replay` goes on at the first key frame of
-//! the part, as it does after any gap. Where the log is damaged, the part has such a mark as well.
+//! the part, as it does after any gap. Where the log is damaged, the part has such a mark as well, and lacks the sample before
+//! the damage: a byte that is missing in it shows in the message behind it.
 
 use stampfly_flight::recorder::KEY_FRAME;
 use stampfly_log::ulog::{End, FlagBits, Message, ReadError, Reader, Scalar};
@@ -24,16 +25,20 @@ pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<(Vec<u8>, End), Rea
     // Where the time stamp of each format is, and of each subscription.
     let (mut stamps, mut ids) = (BTreeMap::new(), BTreeMap::new());
     let (mut newest, mut is_marked) = (reader.started(), false);
+    // Where the last sample begins in the part.
+    let mut last_sample = None;
     loop {
         let begin = reader.offset();
         let Some(message) = reader.next() else { return Ok((kept, reader.end())) };
         let Ok(message) = message else {
             // What was there could be missed, unless nothing follows.
             if reader.offset() < log.len() && (from..=to).contains(&newest) {
+                kept.truncate(last_sample.take().unwrap_or(kept.len()));
                 kept.extend(GAP);
             }
             continue;
         };
+        let is_sample = matches!(message, Message::Data { .. });
         let keeps = match message {
             Message::Format(format) => {
                 let mut columns = format.columns().map_while(Result::ok);
@@ -67,6 +72,7 @@ pub fn cut(log: &[u8], from: Instant, to: Instant) -> Result<(Vec<u8>, End), Rea
                 kept.extend(GAP);
                 is_marked = true;
             }
+            last_sample = is_sample.then_some(kept.len());
             kept.extend(log.get(begin..reader.offset()).unwrap_or_default());
         }
         if let Message::FlagBits(_) = message {
