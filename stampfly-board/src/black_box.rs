@@ -44,6 +44,7 @@ fn rate(topic: usize) -> LogRate {
         }
         Id::motor_test | Id::storage_busy | Id::pairing_request | Id::calibration_request => LogRate::EverySample,
         Id::arm_refusals | Id::restart_request | Id::cutoff_state | Id::parameter_change => LogRate::EverySample,
+        Id::findings | Id::estimate_correction => LogRate::EverySample,
     }
 }
 

@@ -10,6 +10,7 @@ use stampfly_eskf::calibration::Corrections;
 use stampfly_eskf::{ComplementaryConfig, EskfConfig};
 use stampfly_mode::failsafe::WEAK_SHARE;
 use stampfly_mode::{AuthorityConfig, ButtonConfig, FailsafeConfig, LandingConfig, ModeConfig};
+use stampfly_monitor::MonitorConfig;
 use stampfly_types::{math, message_enum};
 
 message_enum! {
@@ -66,6 +67,8 @@ pub struct VehicleConfig {
     pub navigator: NavigatorConfig,
     /// Mode machine and arming.
     pub mode: ModeConfig,
+    /// Who judges the sensors.
+    pub monitor: MonitorConfig,
     /// Detectors of what can go wrong.
     pub failsafe: FailsafeConfig,
     /// Take-off and landing manager. Its ceilings are shares of the cascade's hover thrust.
@@ -108,6 +111,7 @@ impl Default for VehicleConfig {
                 hover_throttle: cascade.altitude.hover_thrust / cascade.altitude.thrust_max,
                 ..ModeConfig::default()
             },
+            monitor: MonitorConfig { ground_clearance_m: ground_clearance, ..MonitorConfig::default() },
             failsafe: FailsafeConfig {
                 imu_lost: LAST_RATES,
                 weak_roll: weak.x,

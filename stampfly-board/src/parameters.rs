@@ -61,7 +61,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
 
     "eskf.process.gyro_noise" [1e-5, 0.03] "rad/s/sqrt(Hz)" eskf.gyro_noise => "gyro noise density";
     "eskf.process.accel_noise" [1e-4, 10.0] "m/s^2/sqrt(Hz)" eskf.accel_noise => "accelerometer noise density";
-    "eskf.process.gyro_bias_walk" [0.0, 0.1] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
+    "eskf.process.gyro_bias_walk" [0.0, 0.03] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
     "eskf.process.accel_bias_walk" [0.0, 0.3] "m/s^2/sqrt(s)" eskf.accel_bias_walk => "accelerometer bias random walk";
     "eskf.obs.tof_noise" [1e-3, 0.3] "m" eskf.tof_sigma => "range noise";
     "eskf.obs.flow_noise" [1e-3, 3.0] "rad/s" eskf.flow_sigma => "flow noise";
@@ -89,6 +89,8 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
     "button.click.double" [0.2, 1.0] "s" button.double_click => "longest time between the clicks of a double click";
     "button.hold.pair" [1.0, 4.0] "s" button.hold_pair => "a press this long pairs";
     "button.hold.reset" [4.5, 20.0] "s" button.hold_reset => "a press this long restarts";
+
+    "monitor.without" [0.0, 8191.0] "1" monitor.without => "hypotheses about sensors that are not asked, a bit each";
 
     "failsafe.impact.flying" [20.0, 150.0] "m/s^2" failsafe.impact => "specific force of an impact";
     "failsafe.impact.landing" [20.0, 150.0] "m/s^2" failsafe.landing_impact => "specific force of an impact while landing";
@@ -135,7 +137,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
     "takeoff.ceiling.rise" [0.0, 10.0] "1/s" landing.takeoff_ceiling_rise => "it rises so fast";
     "takeoff.arrived.band" [0.02, 0.3] "m" landing.takeoff_band => "take-off has arrived this close to its goal";
     "takeoff.arrived.speed" [0.05, 0.5] "m/s" landing.takeoff_speed => "take-off has arrived slower than this";
-    "takeoff.arrived.time" [0.1, 5.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";
+    "takeoff.arrived.time" [0.1, 2.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";
     "takeoff.limit.time" [2.0, 60.0] "s" landing.takeoff_limit => "take-off is complete after this long in any case";
 
     "navigator.takeoff.height" [0.2, 3.0] "m" navigator.take_off_height => "take-off height when a command names none";
@@ -172,6 +174,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
 /// Which runnables hold the parameters whose names begin so. Those of link and sensors apply from the next start.
 const HOLDERS: &[(&[&str], &[Id])] = &[
     (&["estimator.", "eskf."], &[Id::estimation]),
+    (&["monitor."], &[Id::monitor]),
     (&["failsafe."], &[Id::failsafe]),
     (&["landing.", "takeoff."], &[Id::landing]),
     (&["authority.stick.dead_band", "authority.pilot.back"], &[Id::command]),

@@ -15,7 +15,9 @@ stampfly_bus::schedule! {
     pub struct Runnables on crate::topics from VehicleConfig;
 
     /// State estimation.
-    estimation = Estimation: on sensor_imu, flight, 580 us;
+    estimation = Estimation: on sensor_imu, flight, 480 us;
+    /// Judges the sensors; without it all of them are used.
+    monitor = Monitor: after estimation, flight, 120 us;
     /// Anomaly detection.
     failsafe = Failsafe: after estimation or at latest 5 ms, flight, 86 us;
     /// Take-off and landing manager.

@@ -13,17 +13,17 @@ stampfly_bus::topics! {
 
     // Sensing.
     /// Inertial sample, body FRD, specific force; every sample.
-    sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, failsafe, calibration];
+    sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation, monitor, failsafe, calibration];
     /// Range to the ground.
-    sensor_tof: TofData = ring(8) @ 30 Hz from tof => [estimation, failsafe];
+    sensor_tof: TofData = ring(8) @ 30 Hz from tof => [estimation, monitor, failsafe];
     /// Range ahead. Reserved: nothing reads it yet.
     sensor_tof_front: TofData = ring(8) @ 30 Hz from tof_front => [];
     /// Optical flow since the previous sample.
-    sensor_flow: FlowData = ring(16) @ 100 Hz from flow => [estimation, failsafe];
+    sensor_flow: FlowData = ring(16) @ 100 Hz from flow => [estimation, monitor, failsafe];
     /// Magnetic field.
     sensor_mag: MagData = ring(8) @ 25 Hz from mag => [estimation, calibration];
     /// Air pressure.
-    sensor_baro: BaroData = ring(8) @ 25 Hz from baro => [estimation, failsafe, calibration];
+    sensor_baro: BaroData = ring(8) @ 25 Hz from baro => [estimation, monitor, failsafe, calibration];
     /// Where cameras see the vehicle.
     external_pose: ExternalPose = ring(8) @ 100 Hz from cameras => [estimation];
     /// Battery.
@@ -48,15 +48,19 @@ stampfly_bus::topics! {
     /// What the still-calibration has found so far.
     calibration: CalibrationResult = latest @ 50 Hz from calibration => [estimation, mode];
     /// Attitude, velocity, position, and which of them may be used.
-    estimate_state: StateEstimate = latest @ 400 Hz from estimation => [failsafe, mode, landing, navigation, control, telemetry];
+    estimate_state: StateEstimate = latest @ 400 Hz from estimation => [monitor, failsafe, mode, landing, navigation, control, telemetry];
     /// How each sensor agreed with the estimate.
-    estimate_status: EstimatorStatus = latest @ 400 Hz from estimation => [failsafe];
+    estimate_status: EstimatorStatus = latest @ 400 Hz from estimation => [monitor, failsafe];
     /// What the mode machine asks of the estimator.
-    estimator_command: EstimatorCommand = latest @ on event from mode => [estimation];
+    estimator_command: EstimatorCommand = latest @ on event from mode => [estimation, monitor];
+    /// Which sensor measures, and what is wrong with one that does not.
+    findings: SensorFindings = latest @ on event from monitor => [estimation, failsafe];
+    /// What the estimate is to be put right by.
+    estimate_correction: EstimateCorrection = latest @ on event from monitor => [estimation];
 
     // Decisions.
     /// Conditions the failsafe has found.
-    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [landing, mode, command, control, notification, telemetry];
+    system_alert: SystemAlert = latest @ 400 Hz from failsafe => [monitor, landing, mode, command, control, notification, telemetry];
     /// State, mode, armed.
     flight_status: FlightStatus = latest @ 400 Hz from mode => [failsafe, landing, command, navigation, control, actuation, calibration, notification, telemetry, link];
     /// Why the vehicle did not arm when it was asked to; for people.

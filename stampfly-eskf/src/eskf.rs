@@ -19,29 +19,23 @@
 //! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
 //! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
 //! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
-//! | `eskf/vertical.rs` | range against inertia and barometer |
-//! | `eskf/flow_monitor/` | flow against inertia: the comparison, jumps, a picture that does not move |
-//! | `eskf/gyro_monitor.rs` | a jump of the gyro's against flow |
-//! | `eskf/standing.rs` | the gyro against gravity, on the ground |
-//! | `eskf/influence.rs` | what flow did lately, to be undone |
+//! | `eskf/range_gate.rs` | which ranges are compared at all |
+//! | `eskf/fast_turn.rs` | turns that a camera does not follow |
 //! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
 
 mod airspeed;
 mod alignment;
 mod bridge;
 mod external;
-mod flow_monitor;
+mod fast_turn;
 mod gate;
-mod gyro_monitor;
-mod influence;
 mod innovation_bias;
 mod interface;
 mod measurements;
 mod pseudo_measurements;
+mod range_gate;
 mod resets;
-mod standing;
 mod unfelt;
-mod vertical;
 mod wander;
 
 use crate::aid::baro::Offset;
@@ -59,18 +53,15 @@ use crate::measurements::Aiding;
 use crate::tally::{Tallies, Tally};
 use alignment::Alignment;
 use bridge::Bridge;
-use flow_monitor::{FlowMonitor, GyroShift};
+use fast_turn::FastTurn;
 use gate::{GateResult, Gates, Sensor};
-use gyro_monitor::{GyroJump, GyroMonitor, Near};
-use influence::Influence;
 use innovation_bias::InnovationBiasMonitor;
+use range_gate::RangeGate;
 use stampfly_types::messages::{
-    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData, SensorMask,
-    StateEstimate, TofData, Validity,
+    BaroData, CalibrationResult, EstimateCorrection, EstimatorCommand, EstimatorStatus, FlowData, ImuData, MagData,
+    SensorFindings, SensorMask, StateEstimate, TofData, Validity,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
-use standing::{Standing, StandingShift};
-use vertical::{Correction, VerticalMonitor};
 use wander::Wander;
 
 /// Measurements from farther ahead than this are refused, s.
@@ -172,14 +163,16 @@ pub struct Eskf {
     felt: Mean,
     /// Of the specific force and of the rate.
     vibration: [Vibration; 2],
-    standing: Standing,
     alignment: Alignment,
     flow_innovation_bias: InnovationBiasMonitor,
-    flow_influence: Influence,
     bridge: Bridge,
-    vertical: VerticalMonitor,
-    gyro_monitor: GyroMonitor,
-    flow_monitor: FlowMonitor,
+    range_gate: RangeGate,
+    /// When a range was compared last.
+    range_used: Instant,
+    /// Part of the height, upwards, which nothing but the air pressure shows, m.
+    unconfirmed: f32,
+    fast_turn: FastTurn,
+    findings: SensorFindings,
     history: History,
     calibration: CalibrationResult,
     tallies: Tallies,
@@ -240,11 +233,11 @@ impl Eskf {
             felt: Mean::default(),
             gates: Gates::default(),
             flow_innovation_bias: InnovationBiasMonitor::default(),
-            flow_monitor: FlowMonitor::airborne(),
-            flow_influence: Influence::default(),
-            gyro_monitor: GyroMonitor::default(),
-            standing: Standing::default(),
-            vertical: VerticalMonitor::airborne(),
+            fast_turn: FastTurn::default(),
+            findings: SensorFindings::default(),
+            range_gate: RangeGate::default(),
+            range_used: Instant::ZERO,
+            unconfirmed: 0.0,
             status: EstimatorStatus::default(),
             alignment: Alignment::KNOWN,
             aiding_timeout: Duration::from_seconds(config.aiding_timeout),
@@ -294,11 +287,11 @@ impl Eskf {
             felt,
             gates,
             flow_innovation_bias,
-            flow_monitor,
-            flow_influence,
-            gyro_monitor,
-            standing,
-            vertical,
+            fast_turn,
+            findings,
+            range_gate,
+            range_used,
+            unconfirmed,
             status,
             alignment,
             aiding_timeout,
@@ -332,11 +325,11 @@ impl Eskf {
         *felt = Mean::default();
         *gates = Gates::default();
         *flow_innovation_bias = InnovationBiasMonitor::default();
-        *flow_monitor = FlowMonitor::airborne();
-        *flow_influence = Influence::default();
-        *gyro_monitor = GyroMonitor::default();
-        *standing = Standing::default();
-        *vertical = VerticalMonitor::airborne();
+        *fast_turn = FastTurn::default();
+        *findings = SensorFindings::default();
+        *range_gate = RangeGate::default();
+        *range_used = Instant::ZERO;
+        *unconfirmed = 0.0;
         *status = EstimatorStatus::default();
         *alignment = Alignment::KNOWN;
         *aiding_timeout = Duration::from_seconds(config.aiding_timeout);
@@ -503,8 +496,25 @@ impl Eskf {
 
     /// Is the velocity measured, or held by the zero-velocity update?
     fn is_velocity_aided(&self) -> bool {
-        let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.flow_monitor.is_implausible();
+        let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.findings.flow.is_left_out();
         self.anchor.is_some() || flow || self.is_aided_outside(Sensor::Level)
+    }
+
+    /// Standard deviation of the acceleration along body x and y of a vehicle that its thrust carries,
+    /// m/s²: a turn about y or x takes gravity there, and an accelerometer's bias is one.
+    fn acceleration_sigma(&self) -> f32 {
+        let variance = |turn: usize, axis: usize, sign: f32| {
+            let p = |i: usize, j: usize| self.covariance.get(i, j);
+            let (turn, bias) = (ATTITUDE + turn, ACCEL_BIAS + axis);
+            GRAVITY * (GRAVITY * p(turn, turn) + 2.0 * sign * p(turn, bias)) + p(bias, bias)
+        };
+        math::sqrt(math::larger(math::larger(variance(1, 0, 1.0), variance(0, 1, -1.0)), 0.0))
+    }
+
+    /// One standard deviation of the state whose part along x has this index, the larger of x and y.
+    fn larger_sigma(&self, x: usize) -> f32 {
+        let [x, y] = [x, x + 1].map(|index| self.covariance.get(index, index));
+        math::sqrt(math::larger(math::larger(x, y), 0.0))
     }
 
     /// Does drag show the velocity? Only where nothing else does.
@@ -525,7 +535,7 @@ impl Eskf {
 
     /// Does a range hold the height?
     fn is_range_aided(&self) -> bool {
-        self.gates.is_recent(Sensor::Tof, self.now) && !self.vertical.is_implausible()
+        self.gates.is_recent(Sensor::Tof, self.now) && !self.findings.range.is_left_out()
     }
 
     /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.
@@ -535,9 +545,6 @@ impl Eskf {
         if self.command.accel_faulty {
             self.go_on_unfelt(dt);
         } else if self.anchor.is_some() {
-            if let Some(shift) = self.standing.step(dt, &accel, &self.rate) {
-                self.correct_standing_gyro(&shift);
-            }
             self.update_gravity(accel, &Vec3::zeros(), self.config.stationary_gravity_sigma);
         } else if !self.is_velocity_aided() {
             if self.feels_drag() {

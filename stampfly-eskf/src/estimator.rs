@@ -2,8 +2,8 @@
 
 use crate::aid::airspeed::Wind;
 use stampfly_types::messages::{
-    BaroData, CalibrationResult, EstimatorCommand, EstimatorStatus, FlowData, GnssData, GnssFix, ImuData, MagData,
-    StateEstimate, TofData,
+    BaroData, CalibrationResult, EstimateCorrection, EstimatorCommand, EstimatorStatus, FlowData, GnssData, GnssFix,
+    ImuData, MagData, SensorFindings, StateEstimate, TofData,
 };
 use stampfly_types::{Instant, Origin, Quat, Vec3};
 
@@ -155,6 +155,13 @@ pub trait Estimator {
     fn fuse_airspeed(&mut self, _at: Instant, _speed: f32, _sigma: f32, _wind: &mut Wind) -> Fusion {
         Fusion::Refused(Refusal::NotUsed)
     }
+
+    /// Takes what a monitor has found about the sensors: one that does not measure is left out. An
+    /// estimator that has no use for it goes on as before.
+    fn heed(&mut self, _at: Instant, _findings: &SensorFindings) {}
+
+    /// Puts right what a sensor that did not measure has done to the estimate.
+    fn correct(&mut self, _at: Instant, _correction: &EstimateCorrection) {}
 
     /// The state, with a validity per output.
     fn estimate(&self) -> StateEstimate;

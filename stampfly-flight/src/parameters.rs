@@ -270,6 +270,17 @@ impl Value for bool {
     }
 }
 
+/// Up to 65535: each has a number of its own.
+impl Value for u16 {
+    fn number(self) -> f32 {
+        f32::from(self)
+    }
+    fn from_number(number: f32) -> Option<Self> {
+        let whole = number as u16;
+        (f32::from(whole) == number).then_some(whole)
+    }
+}
+
 /// Whole microseconds. A time comes back exactly: up to 16 seconds every microsecond has a number of its own, and above that
 /// a number is always the same time.
 impl Value for Duration {

@@ -23,7 +23,7 @@
 //! | `POWER_IMPLAUSIBLE` | armed, and the voltage changes as no battery's does, or is none | with a plausible one, or disarmed |
 //! | `USB_POWER` | voltage below 3.3 V while disarmed | 0.1 V higher |
 //! | `TOF_LOST`, `FLOW_LOST`, `BARO_LOST` | no usable sample for 1 s | with the next one |
-//! | `RANGE_IMPLAUSIBLE`, `FLOW_IMPLAUSIBLE` | the estimator finds that they contradict the other sensors | when it no longer does |
+//! | `RANGE_IMPLAUSIBLE`, `FLOW_IMPLAUSIBLE` | the monitor has found that they are wrong | when it no longer does |
 //! | `TILT_MISMATCH` | gravity and estimated tilt 10° apart for 0.5 s on the ground | with agreement |
 //! | `ESTIMATE_DIVERGED` | the estimator says so | disarmed |
 //!
@@ -89,7 +89,7 @@ use stampfly_types::{Instant, Stamped};
 /// let imu = [Stamped { at: Instant::ZERO, generation: 1, data }];
 /// let power = PowerData { voltage: 4.1, ..Default::default() };
 /// let quiet = FailsafeInput {
-///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(),
+///     imu: &imu, estimate: &StateEstimate::default(), status: &EstimatorStatus::default(), findings: &SensorFindings::default(),
 ///     power: Some((Instant::ZERO, &power)), command: Some(Instant::ZERO), tof: None, flow: None, baro: None, output: &ControlOutput::default(), unmet: [0.0; 4], thrust: None, self_test: SelfTestVerdict::NotRun, flight_status: &FlightStatus::default(),
 /// };
 /// assert!(failsafe.step(Instant::from_micros(2_500), &quiet).active.is_empty());
@@ -204,8 +204,8 @@ impl Failsafe {
             .set(Alerts::TOF_LOST, lost(&mut self.heard_tof, input.tof))
             .set(Alerts::FLOW_LOST, lost(&mut self.heard_flow, input.flow))
             .set(Alerts::BARO_LOST, lost(&mut self.heard_baro, input.baro))
-            .set(Alerts::RANGE_IMPLAUSIBLE, input.status.range_implausible)
-            .set(Alerts::FLOW_IMPLAUSIBLE, input.status.flow_implausible)
+            .set(Alerts::RANGE_IMPLAUSIBLE, input.findings.range.is_left_out())
+            .set(Alerts::FLOW_IMPLAUSIBLE, input.findings.flow.is_left_out())
             .set(Alerts::SELF_TEST_FAILED, input.self_test == SelfTestVerdict::Failed)
             .set(Alerts::SELF_TEST_DIFFERS, input.self_test == SelfTestVerdict::WithinTolerance);
         self.active = active;

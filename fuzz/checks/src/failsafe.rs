@@ -4,7 +4,8 @@ use crate::Input;
 use stampfly_mode::decision::CUT;
 use stampfly_mode::{Failsafe, FailsafeConfig, FailsafeInput};
 use stampfly_types::messages::{
-    ControlOutput, EstimatorStatus, FlightPhase, FlightStatus, ImuData, SelfTestVerdict, StateEstimate, Validity,
+    ControlOutput, EstimatorStatus, FlightPhase, FlightStatus, ImuData, SelfTestVerdict, SensorFindings, StateEstimate,
+    Validity,
 };
 use stampfly_types::{Duration, Instant, Stamped};
 
@@ -49,6 +50,7 @@ pub fn failsafe_stream(data: &[u8]) {
                 imu: &imu,
                 estimate: &estimate,
                 status: &EstimatorStatus::default(),
+                findings: &SensorFindings::default(),
                 power: None,
                 command: Some(now),
                 tof: None,

@@ -17,6 +17,8 @@ pub struct Estimation {
     /// Has the still-calibration been used?
     started: bool,
     pacer: Pacer,
+    /// Number of the last correction.
+    corrections: u32,
 }
 
 impl Estimation {
@@ -32,6 +34,7 @@ impl Estimation {
             complementary: Complementary::new(config.complementary),
             started: false,
             pacer: Pacer::default(),
+            corrections: 0,
         }
     }
 
@@ -47,7 +50,7 @@ impl Runnable for Estimation {
     type Ends<'b> = EstimationEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
-        let feeding = (&mut self.started, &mut self.pacer);
+        let feeding = (&mut self.started, &mut self.pacer, &mut self.corrections);
         match self.kind {
             EstimatorKind::Eskf => step(&mut self.eskf, feeding, activation.now(), ends),
             EstimatorKind::Complementary => step(&mut self.complementary, feeding, activation.now(), ends),
@@ -59,7 +62,7 @@ impl Runnable for Estimation {
 #[inline(never)]
 fn step(
     estimator: &mut impl Estimator,
-    (started, pacer): (&mut bool, &mut Pacer),
+    (started, pacer, corrections): (&mut bool, &mut Pacer, &mut u32),
     now: Instant,
     ends: &mut EstimationEnds<'_>,
 ) {
@@ -70,6 +73,15 @@ fn step(
     }
     if ends.estimator_command.sample().is_some() {
         estimator.command(now, ends.estimator_command.get());
+    }
+    if ends.findings.sample().is_some() {
+        estimator.heed(now, ends.findings.get());
+    }
+    if let Some(correction) = ends.estimate_correction.sample()
+        && *corrections != correction.data.number
+    {
+        *corrections = correction.data.number;
+        estimator.correct(now, &correction.data);
     }
     let measurements = Measurements {
         imu: &ends.sensor_imu,

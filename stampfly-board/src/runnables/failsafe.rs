@@ -63,6 +63,7 @@ impl Runnable for Failsafe {
                 imu: &ends.sensor_imu,
                 estimate: ends.estimate_state.get(),
                 status: ends.estimate_status.get(),
+                findings: ends.findings.get(),
                 power: power.map(|sample| (sample.at, &sample.data)),
                 command,
                 // A distance of nothing or less is none, whatever the chip's status says: the estimator does not use it.

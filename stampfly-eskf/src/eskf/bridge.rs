@@ -14,8 +14,6 @@ use stampfly_types::{Instant, Vec3};
 /// Garbled samples running that are bridged: of those that follow from each other, and of any.
 const FOLLOWING: u32 = 3;
 const LONGEST: u32 = 20;
-/// Over so many samples differences are taken.
-const DIFFERENCES: u32 = 4;
 
 /// The last sample that was believed, and the garbled ones since.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,8 +25,6 @@ pub(super) struct Bridge {
     /// Garbled samples running, and how many of them follow from each other.
     bridged: u32,
     following: u32,
-    /// Samples for which a difference between samples may still be that of a bridge.
-    settles: u32,
 }
 
 impl Bridge {
@@ -47,21 +43,13 @@ impl Bridge {
                 if self.following <= FOLLOWING && self.bridged <= LONGEST {
                     // As if it had been measured now: what is allowed to the next sample does not grow with a burst.
                     self.last = Some((at, before));
-                    self.settles = DIFFERENCES;
                     return Some(before);
                 }
-                self.settles = 0;
             }
         }
         (self.bridged, self.following) = (0, 0);
-        self.settles = self.settles.saturating_sub(1);
         self.last = Some((at, *imu));
         None
-    }
-
-    /// Was there a bridge among the last samples? Its end is no jump of the gyro's.
-    pub(super) fn was_short(&self) -> bool {
-        self.settles > 0
     }
 }
 

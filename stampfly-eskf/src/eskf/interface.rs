@@ -30,7 +30,6 @@ impl Estimator for Eskf {
         self.command = command;
         self.tallies = tallies;
         self.state.gyro_bias = calibration.gyro_bias;
-        self.gyro_monitor = GyroMonitor::new(at, calibration);
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
         self.pending_rotation = self.state.rotation();
         self.baro_updated = at;
@@ -110,18 +109,12 @@ impl Estimator for Eskf {
         if dt > MAX_STEP {
             self.reset_history();
         }
-        let before = self.state.velocity;
         let motion = self.state.propagate(&imu.accel, &imu.gyro, math::smaller(dt, MAX_STEP));
         self.history.add(&motion);
-        let change = self.state.velocity - before;
-        self.watch(&change, motion.dt);
+        self.rests = self.anchor.is_some() || self.rests && self.height() < self.config.ground_clearance + LIFTED;
         let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);
-        let noise = if self.bridge.was_short() { f32::INFINITY } else { rate.mean_square() };
-        if let Some(jump) = self.gyro_monitor.predict(at, motion.dt, imu, noise, &before, &change) {
-            self.correct_gyro(&jump);
-        }
         self.pending_step.extend(&motion);
         let due = self.pending_step.duration > COVARIANCE_STEP;
         if due {
@@ -151,9 +144,6 @@ impl Estimator for Eskf {
         if self.steps.is_multiple_of(PSEUDO_MEASUREMENT_DIVIDER)
             && let Some((accel, _)) = self.accels.take()
         {
-            if self.anchor.is_none() {
-                self.judge_range();
-            }
             self.apply_pseudo_measurements(accel, dt * PSEUDO_MEASUREMENT_DIVIDER as f32);
         }
         if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() && !self.command.accel_faulty {
@@ -235,7 +225,7 @@ impl Estimator for Eskf {
         let north = self.is_north_known();
         let horizontal = sound && north && self.is_velocity_aided();
         let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
-        let baro = air && !self.vertical.knows_nothing();
+        let baro = air && !self.findings.baro.is_left_out();
         let vertical = sound && (range || baro || down || stationary);
         let valid = Validity::NONE
             .set(Validity::TILT, self.initialized)
@@ -247,7 +237,7 @@ impl Estimator for Eskf {
         let sensors = SensorMask::NONE
             .set(SensorMask::IMU, self.initialized)
             .set(SensorMask::TOF, range)
-            .set(SensorMask::FLOW, recent(Sensor::Flow) && !self.flow_monitor.is_implausible())
+            .set(SensorMask::FLOW, recent(Sensor::Flow) && !self.findings.flow.is_left_out())
             .set(SensorMask::BARO, air)
             .set(SensorMask::MAG, recent(Sensor::Mag))
             .set(SensorMask::ACCEL_ATTITUDE, recent(Sensor::Gravity))
@@ -270,7 +260,23 @@ impl Estimator for Eskf {
     }
 
     fn status(&self) -> EstimatorStatus {
-        self.status
+        EstimatorStatus {
+            acceleration_sigma: self.acceleration_sigma(),
+            velocity_sigma: self.larger_sigma(VELOCITY),
+            gyro_bias_sigma: self.larger_sigma(GYRO_BIAS),
+            ..self.status
+        }
+    }
+
+    fn heed(&mut self, _at: Instant, findings: &SensorFindings) {
+        self.findings = *findings;
+        if !findings.range.is_left_out() {
+            self.unconfirmed = 0.0;
+        }
+    }
+
+    fn correct(&mut self, _at: Instant, correction: &EstimateCorrection) {
+        self.correct_by(correction);
     }
 }
 
@@ -329,24 +335,5 @@ impl Eskf {
             + z * z * p(2, 2)
             + 2.0 * (x * y * p(0, 1) + x * z * p(0, 2) + y * z * p(1, 2));
         variance < CERTAIN_HEADING * CERTAIN_HEADING
-    }
-
-    /// Shows a change of the velocity to those that watch range and flow.
-    #[inline]
-    fn watch(&mut self, change: &Vec3, dt: f32) {
-        let bias = self.state.accel_bias.z;
-        if self.anchor.is_some() {
-            self.vertical.stand(-bias);
-            self.flow_monitor.ready();
-            self.rests = true;
-        } else {
-            let height = self.height();
-            self.rests &= height < self.config.ground_clearance + LIFTED;
-            self.vertical.predict(dt, -change.z - bias * dt, -self.state.velocity.z, -bias, height);
-            if !self.command.flying {
-                self.vertical.rest();
-            }
-            self.flow_monitor.predict(change, dt);
-        }
     }
 }

@@ -1,9 +1,9 @@
 //! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The
 //! models, and the conditions of each sensor, are in [`aid`](crate::aid).
 
-use super::flow_monitor::{Turn, Verdict};
+use super::fast_turn::Turn;
 use super::gate::{GateResult, Sensor};
-use super::vertical::Use;
+use super::range_gate::Use;
 use super::wander::limited;
 use super::*;
 use crate::config::MagModel;
@@ -15,6 +15,8 @@ const BARO_REACH: f32 = 2.0;
 const LONGEST_BARO: f32 = 0.5;
 /// A receiver that is silent for longer leaves the height to the barometer.
 const FIX_SILENT: Duration = Duration::from_secs(2);
+/// A range that has not been used for so long holds neither height nor climb rate: six readings.
+const RANGE_SILENT: Duration = Duration::from_millis(200);
 /// Variance of the height, m², beyond which the barometer's first offset is as uncertain as that height: after a receiver's first fix.
 const VAGUE_HEIGHT: f32 = 1.0;
 /// Test ratio of a range that is rejected whatever its gate says.
@@ -22,14 +24,8 @@ const REJECTED: f32 = 2.0;
 /// Largest climb rate that a wrong acceleration is taken to have made within the lock-out, m/s: 7.5 m/s², more than the zero of
 /// a shaken accelerometer moves.
 const WRONG_CLIMB: f32 = 1.5;
-/// At this distance an error of the velocity of 0.05 m/s is a rate of 0.33 rad/s.
-const GYRO_DISTANCE: f32 = 0.15;
 /// The picture never moves farther in its longest interval, rad: 100 rad/s, more than any gyro measures.
 const LARGEST_FLOW: f32 = 10.0;
-/// Mean square change of the accelerometer from sample to sample beyond which it says nothing about flow, (m/s²)².
-const SHAKEN: f32 = 100.0;
-/// A vehicle that turns faster, rad/s, does not stand.
-const TURNS: f32 = 0.5;
 /// Largest standard deviation of the height, m, and for each metre of distance: flow is the velocity over it, and a velocity that
 /// may be half or twice as large is none.
 const KNOWN_DISTANCE: f32 = 0.1;
@@ -55,20 +51,24 @@ impl Eskf {
         if cos_tilt < self.config.min_cos_tilt {
             return Err(Refusal::Tilt);
         }
+        if let Some(tested) = self.status.tested.get_mut(Counter::Tof as usize) {
+            *tested = tested.wrapping_add(1);
+        }
         let below = tof.distance * cos_tilt;
         if let Some(anchor) = self.anchor {
             // Stationary: the range measures the surface below the sensor, not the height of the vehicle.
             let measured = anchor.z + below;
             self.surface = Some(self.surface.map_or(measured, |surface| surface + 0.1 * (measured - surface)));
             self.gates.accept(Sensor::Tof, self.now);
-            self.vertical.stand_range(self.now, tof.distance);
+            self.unconfirmed = 0.0;
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
         let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
-        let use_as = self.vertical.range(self.now, tof.distance, expected, self.gates.is_rejected(Sensor::Tof));
-        if use_as == Use::Ignore {
+        let use_as = self.range_gate.step(self.now, tof.distance, expected, self.gates.is_rejected(Sensor::Tof));
+        if use_as == Use::Ignore || self.findings.range.is_left_out() {
             return Err(Refusal::Implausible);
         }
+        self.range_used = self.now;
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
         // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the
@@ -83,26 +83,14 @@ impl Eskf {
         let gated = if use_as == Use::Reject { ratio.max(REJECTED) } else { ratio };
         match self.test(Sensor::Tof, gated) {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
-            GateResult::Reject => {
-                self.vertical.rejected(self.now);
-                Ok(Fusion::Gated { ratio })
-            }
+            GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
-                let velocity = self.state.velocity;
-                let known = self.gates.is_recent(Sensor::Flow, self.now);
-                let speed = known.then(|| math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y));
-                if self.vertical.refuses_jump(speed, tof.distance / expected) {
-                    return Err(Refusal::Implausible);
-                }
                 let down = surface - below - delayed.state.position.z;
-                self.vertical.rejected(self.now);
-                if self.vertical.rejects_since_jump() {
+                if self.range_gate.rejects_since_jump() {
                     // No vehicle moves so far from one reading to the next: it is the surface that is another one.
-                    self.vertical.stepped();
                     self.surface = Some(surface - down);
                     return Ok(self.finish_reset(Sensor::Tof));
                 }
-                self.vertical.moved(-down);
                 self.state.position.z += down;
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
                 // A wrong height comes from a wrong climb rate, and that from a wrong acceleration in the time of the
@@ -132,7 +120,7 @@ impl Eskf {
             return Err(Refusal::Tilt);
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
-        let distance = (surface - delayed.state.position.z - self.vertical.claimed()) / delayed.rotation[2][2];
+        let distance = (surface - delayed.state.position.z - self.unconfirmed) / delayed.rotation[2][2];
         if distance < self.config.flow_min_distance {
             return Err(Refusal::Range);
         }
@@ -144,17 +132,6 @@ impl Eskf {
         let raw = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate) + self.state.gyro_bias;
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
-        if let Some(jump) = self.examine_gyro(at, flow.interval, delayed, measured, distance) {
-            self.correct_gyro(&jump);
-            return Ok(Fusion::Reset);
-        }
-        if self.anchor.is_none() {
-            match self.flow_monitor.turns_fast([raw.y, -raw.x], flow.interval) {
-                Turn::Slow => {}
-                Turn::Fast => return Err(Refusal::Range),
-                Turn::Over(angle) => self.inflate_turned(angle),
-            }
-        }
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
         // Written out: `map` would be a call.
         let [x, y] = rows;
@@ -175,40 +152,25 @@ impl Eskf {
         // Flow measures two axes of the body's; along the beam the velocity is the estimated one.
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
-        let counts = [flow.delta_x, flow.delta_y];
-        // Less the bias of the ground, which flow cannot have moved.
-        let turn = raw - self.calibration.gyro_bias;
-        if self.rests {
-            // One that turns over a leg moves as it turns, and the picture stands still.
-            if turn.x * turn.x + turn.y * turn.y < TURNS * TURNS {
-                let bias = self.state.gyro_bias;
-                let rate = [measured[0] / distance + bias.y, measured[1] / distance - bias.x];
-                self.flow_monitor.stand(rate, flow.interval);
-            }
-        } else {
-            let shaken = self.vibration[0].mean_square();
-            let felt = shaken <= SHAKEN && !self.command.accel_faulty;
-            let known = felt && self.is_range_aided() && !self.gates.is_rejected(Sensor::Tof);
-            let shaken = known.then_some(shaken);
-            let turning = [turn.y, -turn.x];
-            match self.flow_monitor.flow(counts, turning, &world, distance, flow.interval, shaken) {
-                Verdict::Unchanged => {}
-                Verdict::Implausible(lied) => self.undo_flow(lied),
-                Verdict::GyroShifted(shift) => {
-                    self.correct_gyro_shift(&shift, &world, distance);
-                    return Ok(Fusion::Reset);
+        if let Some(tested) = self.status.tested.get_mut(Counter::Flow as usize) {
+            *tested = tested.wrapping_add(1);
+        }
+        if self.anchor.is_none() {
+            match self.fast_turn.step([raw.x, raw.y], flow.interval) {
+                Turn::Slow => {}
+                Turn::Fast => return Err(Refusal::Range),
+                Turn::Over(angle) => {
+                    // From the next reading on.
+                    self.inflate_turned(angle);
+                    return Err(Refusal::Range);
                 }
             }
         }
-        self.status.flow_implausible = self.flow_monitor.is_implausible();
-        if self.status.flow_implausible {
+        if self.findings.flow.is_left_out() {
             return Err(Refusal::Implausible);
         }
         self.acceleration.update(middle, world);
-        let (raw, bias) = (self.force + self.state.accel_bias, self.state.gyro_bias);
-        let rotation = self.state.rotation();
-        let before = rotate(&rotation, &self.force);
-        let fusion = match self.test(Sensor::Flow, ratio) {
+        match self.test(Sensor::Flow, ratio) {
             GateResult::Fuse => {
                 let Some(mut correction) = self.covariance.try_update(&innovation) else {
                     return Err(Refusal::Implausible);
@@ -216,56 +178,28 @@ impl Eskf {
                 if self.command.flying {
                     self.covariance.consider(&innovation, VERTICAL, &mut correction);
                 }
-                self.flow_influence.add(&correction, &rotation, flow.interval);
                 self.state.correct(&correction);
                 // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
                 // nothing.
                 if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
                     self.inflate_on_innovation_bias();
                 }
-                Fusion::Fused { ratio }
+                Ok(Fusion::Fused { ratio })
             }
-            GateResult::Reject => return Ok(Fusion::Gated { ratio }),
+            GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 let mut correction = [0.0; N];
                 correction[VELOCITY] = world.x - delayed.state.velocity.x;
                 correction[VELOCITY + 1] = world.y - delayed.state.velocity.y;
-                self.flow_influence.add(&correction, &rotation, flow.interval);
                 self.state.correct(&correction);
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
                 }
                 // A wrong velocity comes from a wrong tilt or bias.
                 self.inflate_tilt();
-                self.finish_reset(Sensor::Flow)
+                Ok(self.finish_reset(Sensor::Flow))
             }
-        };
-        let rotation = self.state.rotation();
-        let after = rotate(&rotation, &(raw - self.state.accel_bias));
-        self.flow_monitor.corrected(&(after - before), &rotate(&rotation, &(self.state.gyro_bias - bias)));
-        Ok(fusion)
-    }
-
-    /// Shows flow's velocity along body x and y to who watches the gyro.
-    fn examine_gyro(
-        &mut self,
-        at: Instant,
-        interval: f32,
-        delayed: &DelayedState,
-        measured: [f32; 2],
-        distance: f32,
-    ) -> Option<GyroJump> {
-        let near = match self.anchor {
-            Some(_) => Near::Standing,
-            None if distance < GYRO_DISTANCE => Near::Above,
-            None => Near::Far,
-        };
-        let velocity = rotate_back(&delayed.rotation, &self.gyro_monitor.velocity(delayed.state.velocity));
-        let excess = [(measured[1] - velocity.y) / distance, (velocity.x - measured[0]) / distance];
-        let from = at - Duration::from_micros(((self.config.flow_delay + interval) * 1e6) as u64);
-        // Flow that lies says nothing.
-        let near = (!self.flow_monitor.is_implausible()).then_some(near);
-        self.gyro_monitor.flow(self.now, from, interval, excess, near)
+        }
     }
 
     pub(super) fn update_baro(&mut self, at: Instant, baro: &BaroData) -> Result<Fusion, Refusal> {
@@ -278,8 +212,7 @@ impl Eskf {
             // An altitude of what? The first fix says.
             return Err(Refusal::Missing);
         }
-        self.vertical.baro(self.now, baro.altitude, self.height(), self.anchor.is_some());
-        if self.command.flying && self.anchor.is_none() && self.vertical.is_silent() {
+        if self.command.flying && self.anchor.is_none() && self.now.since(self.range_used) > RANGE_SILENT {
             // Only a range shows how the accelerometer's zero moves with the thrust; without one it may be anywhere near.
             let walk = self.config.thrust_bias_walk;
             let time = self.now.since(self.baro_updated).seconds().min(LONGEST_BARO);

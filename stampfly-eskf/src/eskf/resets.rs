@@ -5,10 +5,7 @@
 //! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
 //! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
 //! | a turn that is faster than flow follows | variance of the tilt | no |
-//! | the second opinion about the range ([`vertical`](super::vertical)) | climb rate, height, vertical accelerometer bias | no |
-//! | the second opinion about flow ([`flow_monitor`](super::flow_monitor)) | what flow did to tilt, gyro bias and velocity in the last second, or since the take-off | no |
-//! | the course of flow's difference ([`gyro`](super::flow_monitor)) | gyro bias, tilt, horizontal velocity | no |
-//! | the picture of the floor ([`gyro_monitor`](super::gyro_monitor)) | gyro bias, tilt, horizontal velocity | no |
+//! | whoever judges sensors ([`correct`](crate::Estimator::correct)) | attitude, velocity, biases | no |
 //! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
 
 use super::*;
@@ -21,20 +18,6 @@ const TURNED: f32 = 0.05;
 /// and rad/s.
 const TILT_INFLATION: f32 = 0.1;
 const GYRO_BIAS_INFLATION: f32 = 0.03;
-/// Uncertain share of a jump of the gyro's, and uncertain velocity after it, m/s.
-const JUMP_UNCERTAIN: f32 = 0.2;
-const JUMP_VELOCITY: f32 = 0.1;
-/// For how long what is left of a jump turns the tilt, s.
-const SETTLES: f32 = 0.5;
-/// What is left when a second of lies is undone: standard deviations of tilt, rad, gyro bias, rad/s, and velocity, m/s.
-const LIE_TILT: f32 = 0.03;
-const LIE_GYRO_BIAS: f32 = 0.01;
-const LIE_VELOCITY: f32 = 0.3;
-/// Standard deviations of tilt, rad, and gyro bias, rad/s, that a shift of the gyro's zero leaves: a tenth of 0.5 rad/s and its tilt.
-const SHIFT_TILT: f32 = 0.05;
-const SHIFT_GYRO_BIAS: f32 = 0.05;
-/// Standard deviation of the gyro's bias after one on the ground, rad/s.
-const STANDING_SHIFT: f32 = 0.01;
 /// Standard deviation that the tilt gains until north is found, rad.
 const ALIGNED_TILT: f32 = 0.03;
 /// Standard deviation of the velocity after a restart in flight, m/s.
@@ -67,7 +50,6 @@ impl Eskf {
 
     /// Inflates the tilt and the gyro bias that may have tilted it.
     pub(super) fn inflate_tilt(&mut self) {
-        self.flow_monitor.inflated(TILT_INFLATION);
         for axis in 0..2 {
             self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
             self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
@@ -79,93 +61,45 @@ impl Eskf {
     /// The vehicle has turned by this angle, rad, faster than flow follows.
     pub(super) fn inflate_turned(&mut self, angle: f32) {
         let tilt = TURNED * angle;
-        self.flow_monitor.inflated(tilt);
         for axis in 0..2 {
             self.covariance.inflate(ATTITUDE + axis, tilt * tilt);
         }
     }
 
-    /// Undoes what flow did in the last `lied` seconds, because it lied.
-    pub(super) fn undo_flow(&mut self, lied: f32) {
-        let correction = self.flow_influence.undo(&self.state.rotation(), lied);
-        self.state.correct(&correction);
-        for axis in 0..2 {
-            self.covariance.inflate(ATTITUDE + axis, LIE_TILT * LIE_TILT);
-            self.covariance.inflate(GYRO_BIAS + axis, LIE_GYRO_BIAS * LIE_GYRO_BIAS);
-            self.covariance.reset(VELOCITY + axis, LIE_VELOCITY * LIE_VELOCITY);
-            self.reset_accel_bias(axis);
-        }
-        self.reset_history();
-    }
-
-    /// Takes a jump that was the gyro's own out of bias, attitude and velocity.
+    /// Puts right what a sensor that was wrong has done.
     // Hardly ever.
     #[inline(never)]
-    pub(super) fn correct_gyro(&mut self, jump: &GyroJump) {
-        let turned = jump.rate.map(|rate| rate * jump.age);
-        let mut correction = [0.0; N];
-        for axis in 0..2 {
-            correction[GYRO_BIAS + axis] = jump.rate[axis];
-            correction[ATTITUDE + axis] = -turned[axis];
-            let [rate, turn] = [jump.rate[axis], turned[axis]].map(|value| JUMP_UNCERTAIN * value);
-            self.covariance.inflate(GYRO_BIAS + axis, rate * rate);
-            self.covariance.inflate(ATTITUDE + axis, turn * turn);
-            self.covariance.inflate(VELOCITY + axis, JUMP_VELOCITY * JUMP_VELOCITY);
-            // Here the filter starts again, and what turned on the ground is taken to be the gyro's.
-            self.calibration.gyro_bias[axis] += jump.rate[axis];
+    pub(super) fn correct_by(&mut self, correction: &EstimateCorrection) {
+        let EstimateCorrection { turn, velocity, down, gyro_bias, accel_bias, .. } = correction;
+        let numbers = [turn, velocity, gyro_bias, accel_bias].map(Vec3::norm_squared);
+        if !self.initialized || !numbers.into_iter().all(f32::is_finite) || !(down + correction.unconfirmed).is_finite()
+        {
+            return;
         }
-        self.state.correct(&correction);
-        self.state.velocity.x = jump.velocity.x;
-        self.state.velocity.y = jump.velocity.y;
-        self.flow_monitor.gyro_jumped();
-        // What is left of the jump turns the tilt until flow has corrected it.
-        let [x, y] = jump.rate;
-        self.flow_monitor.inflated(JUMP_UNCERTAIN * SETTLES * math::sqrt(x * x + y * y));
-        self.reset_history();
-        self.status.resets = self.status.resets.wrapping_add(1);
-    }
-
-    /// Takes a shift of the gyro's zero on the ground out of its bias. What it did to the attitude went into the accelerometer's bias as
-    /// well, so both are as after power-on: gravity is the vertical.
-    pub(super) fn correct_standing_gyro(&mut self, shift: &StandingShift) {
-        for axis in 0..2 {
-            self.state.gyro_bias[axis] += shift.rate[axis];
-            self.calibration.gyro_bias[axis] += shift.rate[axis];
-            self.covariance.inflate(GYRO_BIAS + axis, STANDING_SHIFT * STANDING_SHIFT);
-            self.covariance.inflate(ATTITUDE + axis, LIE_TILT * LIE_TILT);
+        let (sin, cos) = math::sin_cos(0.5 * turn.norm());
+        let axis = turn * (sin / math::larger(turn.norm(), f32::MIN_POSITIVE));
+        self.state.attitude = multiply([cos, axis.x, axis.y, axis.z], self.state.attitude);
+        self.state.velocity += velocity;
+        self.state.position.z += down;
+        self.state.gyro_bias += gyro_bias;
+        self.state.accel_bias += accel_bias;
+        // Here the filter starts again.
+        self.calibration.gyro_bias = self.state.gyro_bias;
+        let square = |sigma: f32| if sigma.is_finite() { sigma * sigma } else { 0.0 };
+        if correction.climb_sigma > 0.0 {
+            self.unconfirmed = correction.unconfirmed;
+            self.covariance.reset(VELOCITY + 2, square(correction.climb_sigma));
+            self.covariance.inflate(POSITION + 2, 0.1);
+            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
+            // The barometer holds the height from here.
+            self.baro_offset = None;
+        }
+        for axis in (0..2).filter(|_| correction.tilt_sigma > 0.0) {
+            self.covariance.inflate(ATTITUDE + axis, square(correction.tilt_sigma));
+            self.covariance.inflate(GYRO_BIAS + axis, square(correction.gyro_bias_sigma));
+            self.covariance.inflate(VELOCITY + axis, square(correction.velocity_sigma));
             self.reset_accel_bias(axis);
         }
-        let up = rotate_back(&self.state.rotation(), &Vec3::new(0.0, 0.0, -1.0));
-        let tilt = shift.accel.cross(&up) / shift.accel.norm().max(1.0);
-        let mut correction = [0.0; N];
-        correction[ATTITUDE..ATTITUDE + 2].copy_from_slice(&[tilt.x, tilt.y]);
-        self.state.correct(&correction);
-        self.reset_history();
-        self.status.resets = self.status.resets.wrapping_add(1);
-    }
-
-    /// Takes a shift of the gyro's zero out of bias, attitude and velocity. `measured`: flow's velocity, world.
-    pub(super) fn correct_gyro_shift(&mut self, shift: &GyroShift, measured: &Vec3, distance: f32) {
-        let rotation = self.state.rotation();
-        let [bias, tilt] = [shift.bias, shift.tilt].map(|[x, y]| rotate_back(&rotation, &Vec3::new(x, y, 0.0)));
-        let mut correction = [0.0; N];
-        for axis in 0..2 {
-            correction[GYRO_BIAS + axis] = bias[axis];
-            correction[ATTITUDE + axis] = tilt[axis];
-            self.covariance.inflate(ATTITUDE + axis, SHIFT_TILT * SHIFT_TILT);
-            self.covariance.inflate(GYRO_BIAS + axis, SHIFT_GYRO_BIAS * SHIFT_GYRO_BIAS);
-            self.covariance.inflate(VELOCITY + axis, JUMP_VELOCITY * JUMP_VELOCITY);
-            // Here the filter starts again, and what turned on the ground is taken to be the gyro's.
-            self.calibration.gyro_bias[axis] += bias[axis];
-        }
-        self.state.correct(&correction);
-        // The rotation that flow was compensated for is the raw one.
-        let bias = rotate(&self.state.rotation(), &self.state.gyro_bias);
-        self.state.velocity.x = measured.x + distance * bias.y;
-        self.state.velocity.y = measured.y - distance * bias.x;
-        self.flow_influence = Influence::default();
-        self.flow_monitor.start_over();
-        self.flow_monitor.inflated(SHIFT_TILT);
         self.reset_history();
         self.status.resets = self.status.resets.wrapping_add(1);
     }
@@ -221,8 +155,8 @@ impl Eskf {
         self.felt = Mean::default();
         self.gates = Gates::default();
         self.flow_innovation_bias = InnovationBiasMonitor::default();
-        self.flow_monitor = FlowMonitor::airborne();
-        self.vertical.restart(-self.state.accel_bias.z);
+        self.fast_turn = FastTurn::default();
+        self.range_gate = RangeGate::default();
         self.reset_history();
         self.status.diverged = false;
     }
@@ -261,23 +195,5 @@ impl Eskf {
     fn claims_height(&self) -> bool {
         let measured = self.surface.is_some() || self.baro_offset.is_some() || self.is_aided_outside(Sensor::Down);
         self.command.flying || measured
-    }
-
-    /// Asks the second opinion about the range. Where it contradicts, height, climb rate and bias are its.
-    // As the pseudo-measurements, not in every step.
-    #[inline(never)]
-    pub(super) fn judge_range(&mut self) {
-        if let Some(Correction { climb, bias, higher }) = self.vertical.judge(self.now, self.height()) {
-            self.state.velocity.z = -climb;
-            self.state.position.z -= higher;
-            self.state.accel_bias.z = -bias;
-            self.covariance.reset(VELOCITY + 2, 0.5);
-            self.covariance.inflate(POSITION + 2, 0.1);
-            self.covariance.reset(ACCEL_BIAS + 2, 0.1);
-            // The barometer holds the height from here.
-            self.baro_offset = None;
-            self.status.resets = self.status.resets.wrapping_add(1);
-        }
-        self.status.range_implausible = self.vertical.is_implausible();
     }
 }

@@ -110,5 +110,8 @@ fn nested(seeds: &[u64]) -> Vec<u64> {
 /// Eight vehicles in the air at once on one thread: there is nothing they could share.
 #[test]
 fn vehicles_on_the_same_thread_do_not_matter() {
-    assert_eq!(nested(&SEEDS), *ALONE);
+    // Without optimisation a flight needs a quarter of a megabyte of stack.
+    let stack = SEEDS.len() << 20;
+    let thread = std::thread::Builder::new().stack_size(stack).spawn(|| nested(&SEEDS)).expect("a thread");
+    assert_eq!(thread.join().expect("no panic"), *ALONE);
 }

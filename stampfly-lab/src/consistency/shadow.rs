@@ -7,7 +7,8 @@
 use stampfly_board::{schedule, topics};
 use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Fusion, Measurements, Pacer};
 use stampfly_types::messages::{
-    BaroData, CalibrationResult, EstimatorCommand, ExternalPose, FlowData, ImuData, MagData, TofData,
+    BaroData, CalibrationResult, EstimateCorrection, EstimatorCommand, ExternalPose, FlowData, ImuData, MagData,
+    SensorFindings, TofData,
 };
 use stampfly_types::{ActivationRecord, InputRecord, Instant, Message, Stamped};
 use std::collections::VecDeque;
@@ -74,6 +75,10 @@ pub struct Shadow {
     pose: Recent<ExternalPose>,
     calibration: Recent<CalibrationResult>,
     command: Recent<EstimatorCommand>,
+    findings: Recent<SensorFindings>,
+    correction: Recent<EstimateCorrection>,
+    /// Number of the last correction.
+    corrections: u32,
     /// What the mode machine asked for last.
     asked: Option<EstimatorCommand>,
     last_imu: Option<(Instant, ImuData)>,
@@ -96,6 +101,9 @@ impl Shadow {
             pose: Recent::default(),
             calibration: Recent::default(),
             command: Recent::default(),
+            findings: Recent::default(),
+            correction: Recent::default(),
+            corrections: 0,
             asked: None,
             last_imu: None,
         }
@@ -130,6 +138,8 @@ impl Shadow {
             topics::Id::external_pose => self.pose.add(at, generation, words),
             topics::Id::calibration => self.calibration.add(at, generation, words),
             topics::Id::estimator_command => self.command.add(at, generation, words),
+            topics::Id::findings => self.findings.add(at, generation, words),
+            topics::Id::estimate_correction => self.correction.add(at, generation, words),
             topics::Id::estimate_state => {
                 self.identical &= words == self.estimator.estimate().to_words().as_ref() as &[u32];
             }
@@ -146,7 +156,9 @@ impl Shadow {
             return;
         }
         // In the order of the topic table.
-        let &[imu, tof, flow, mag, baro, pose, calibration, command] = record.inputs() else { return };
+        let &[imu, tof, flow, mag, baro, pose, calibration, command, findings, correction] = record.inputs() else {
+            return;
+        };
         let (now, estimator) = (record.now, &mut self.estimator);
         if let Some(calibration) = self.calibration.taken(calibration).last()
             && calibration.data.complete
@@ -158,6 +170,15 @@ impl Shadow {
         self.asked = self.command.taken(command).last().map(|command| command.data).or(self.asked);
         if let Some(command) = &self.asked {
             estimator.command(now, command);
+        }
+        if let Some(findings) = self.findings.taken(findings).last() {
+            estimator.heed(now, &findings.data);
+        }
+        if let Some(correction) = self.correction.taken(correction).last()
+            && self.corrections != correction.data.number
+        {
+            self.corrections = correction.data.number;
+            estimator.correct(now, &correction.data);
         }
         let (imu, tof, flow) = (self.imu.taken(imu), self.tof.taken(tof), self.flow.taken(flow));
         let (mag, baro, pose) = (self.mag.taken(mag), self.baro.taken(baro), self.pose.taken(pose));

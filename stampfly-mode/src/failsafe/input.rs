@@ -1,7 +1,8 @@
 //! What the failsafe looks at in one step. Everything is borrowed.
 
 use stampfly_types::messages::{
-    ControlOutput, EstimatorStatus, FlightStatus, ImuData, MotorOutput, PowerData, SelfTestVerdict, StateEstimate,
+    ControlOutput, EstimatorStatus, FlightStatus, ImuData, MotorOutput, PowerData, SelfTestVerdict, SensorFindings,
+    StateEstimate,
 };
 use stampfly_types::{Instant, Stamped, Vec3};
 
@@ -14,6 +15,8 @@ pub struct FailsafeInput<'a> {
     pub estimate: &'a StateEstimate,
     /// The estimator's own opinion.
     pub status: &'a EstimatorStatus,
+    /// What is wrong with a sensor, as a monitor has found it.
+    pub findings: &'a SensorFindings,
     /// Newest battery sample.
     pub power: Option<(Instant, &'a PowerData)>,
     /// Newest command of any kind.

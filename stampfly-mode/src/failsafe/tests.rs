@@ -12,7 +12,8 @@ use super::*;
 use proptest::prelude::*;
 use stampfly_types::Duration;
 use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, StateEstimate};
-use stampfly_types::messages::{FlightMode, FlightStatus, Validity};
+use stampfly_types::messages::{Finding, Health};
+use stampfly_types::messages::{FlightMode, FlightStatus, SensorFindings, Validity};
 use stampfly_types::{GRAVITY, Quat, Vec3};
 use std::vec;
 use std::vec::Vec;
@@ -26,6 +27,7 @@ struct Rig {
     now: Instant,
     estimate: StateEstimate,
     status: EstimatorStatus,
+    findings: SensorFindings,
     battery: PowerData,
     /// When the battery was read, if that was not now.
     read: Option<Instant>,
@@ -45,6 +47,7 @@ impl Rig {
             now: Instant::ZERO,
             estimate: StateEstimate { height: 1.0, valid: Validity::ALL, ..Default::default() },
             status: EstimatorStatus::default(),
+            findings: SensorFindings::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },
             read: None,
             output: ControlOutput::default(),
@@ -90,6 +93,7 @@ impl Rig {
             imu,
             estimate: &self.estimate,
             status: &self.status,
+            findings: &self.findings,
             power: Some((self.read.unwrap_or(now), &self.battery)),
             command: Some(now),
             tof: Some(now),
@@ -195,6 +199,7 @@ fn the_battery_warns_before_it_lands() {
             imu: &inertial::still(k * 100),
             estimate: &StateEstimate::default(),
             status: &EstimatorStatus::default(),
+            findings: &SensorFindings::default(),
             power: Some((at, &power)),
             command: Some(at),
             tof: Some(at),
@@ -225,6 +230,7 @@ fn quiet(failsafe: &mut Failsafe, millis: u64, command: Option<u64>, power: Opti
         imu: &inertial::still(millis),
         estimate: &StateEstimate::default(),
         status: &EstimatorStatus::default(),
+        findings: &SensorFindings::default(),
         power: power.map(|(at, _)| (Instant::from_millis(at), &battery)),
         command: command.map(Instant::from_millis),
         tof: Some(now),
@@ -280,6 +286,7 @@ fn a_failed_self_test_is_an_alert_for_good() {
             imu: &[],
             estimate,
             status,
+            findings: &SensorFindings::default(),
             power,
             command: Some(Instant::ZERO),
             tof: None,
@@ -314,6 +321,7 @@ fn a_silent_sensor_is_named_on_the_ground_and_in_the_air() {
                     imu: &inertial::still(millis),
                     estimate: &StateEstimate::default(),
                     status: &EstimatorStatus::default(),
+                    findings: &SensorFindings::default(),
                     power: Some((now, &power)),
                     command: Some(now),
                     tof,
@@ -426,4 +434,16 @@ fn a_noisy_gyro_ends_the_flight_by_a_landing() {
     assert_eq!(spikes(20, 4_000), [false, true]);
     assert_eq!(spikes(40, 4_000), [false, false], "a spike now and then");
     assert_eq!(spikes(2, 4_000), [true, true], "every second sample");
+}
+
+#[test]
+fn a_sensor_that_is_left_out_is_said_and_one_with_another_zero_is_not() {
+    let found = |finding| Health { finding, since: Instant::ZERO };
+    let mut rig = Rig::flying().settled();
+    rig.findings = SensorFindings { range: found(Finding::Stuck), ..SensorFindings::default() };
+    assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::RANGE_IMPLAUSIBLE);
+    rig.findings = SensorFindings { flow: found(Finding::Jumped), ..SensorFindings::default() };
+    assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::FLOW_IMPLAUSIBLE);
+    rig.findings = SensorFindings { gyro: found(Finding::Shifted), ..SensorFindings::default() };
+    assert_eq!(rig.sample(REST, Vec3::zeros()), Alerts::NONE);
 }

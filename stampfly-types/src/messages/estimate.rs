@@ -101,14 +101,20 @@ message! {
         refused: [u32; 5],
         /// Measurements offered since the start, in the same order.
         offered: [u32; 5],
+        /// Ranges and flow that were compared with the estimate, used or not, in the same order; zero for
+        /// the others and for an estimator that does not count them.
+        tested: [u32; 5],
         /// Inertial samples refused since the start: not finite, or garbage that was bridged.
         imu_refused: u32,
         /// Resets since the start.
         resets: u32,
-        /// Does the range contradict the accelerometer and the barometer?
-        range_implausible: bool,
-        /// Does the flow contradict the accelerometer?
-        flow_implausible: bool,
+        /// One standard deviation of the horizontal acceleration that tilt and accelerometer biases make
+        /// of the specific force, the larger of both axes'. On the ground it is small whatever the tilt.
+        acceleration_sigma: f32 ["m/s^2"],
+        /// One standard deviation of the horizontal velocity, the larger of both axes'.
+        velocity_sigma: f32 ["m/s"],
+        /// One standard deviation of the gyro's bias about roll and pitch, the larger of both.
+        gyro_bias_sigma: f32 ["rad/s"],
         /// Is the estimate lost?
         diverged: bool,
     }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`sensor`] | [`ImuData`] [`TofData`] [`FlowData`] [`MagData`] [`BaroData`] [`ExternalPose`] [`PowerData`] [`GnssData`] [`AirspeedData`] |
 //! | [`estimate`] | [`StateEstimate`] [`EstimatorStatus`] [`EstimatorCommand`] [`CalibrationResult`] [`AirState`] |
+//! | [`health`] | [`SensorFindings`] [`EstimateCorrection`] |
 //! | [`calibration`] | [`CalibrationRequest`] [`CalibrationReport`] |
 //! | [`command`] | [`PilotInput`] [`GuidedCommand`] [`ButtonEvent`] [`CommandSetpoint`] [`Setpoint`] |
 //! | [`control`] | [`ControlOutput`] [`MotorOutput`] [`ServoOutput`] |
@@ -16,6 +17,7 @@ pub mod command;
 pub mod control;
 pub mod estimate;
 mod garbled;
+pub mod health;
 pub mod sensor;
 pub mod system;
 
@@ -28,6 +30,7 @@ pub use control::{ControlOutput, MAX_MOTORS, MAX_SERVOS, MotorOutput, ServoOutpu
 pub use estimate::{
     AirState, CalibrationResult, EstimatorCommand, EstimatorStatus, SensorMask, StateEstimate, Validity,
 };
+pub use health::{EstimateCorrection, Finding, Health, SensorFindings};
 pub use sensor::{
     AirspeedData, BaroData, ExternalPose, FlowData, GnssData, GnssFix, ImuData, MagData, PowerData, TofData,
 };

@@ -18,7 +18,7 @@ use stampfly_fixed_wing::messages::{Home, MeasuredHeights};
 use stampfly_fixed_wing::{Config, PathManager, Sensed, Watch, Watched};
 use stampfly_mode::FailsafeInput;
 use stampfly_param::ParameterSet;
-use stampfly_types::messages::{ControlOutput, SelfTestVerdict};
+use stampfly_types::messages::{ControlOutput, SelfTestVerdict, SensorFindings};
 use stampfly_types::{Duration, Instant, Stamped};
 
 /// An estimate that is older is none: ten samples were missed.
@@ -94,6 +94,7 @@ impl Runnable for Failsafe {
                 imu: &ends.sensor_imu,
                 estimate: &protection::above_any_ground(ends.estimate_state.get()),
                 status: ends.estimate_status.get(),
+                findings: &SensorFindings::default(),
                 power: ends.sensor_power.sample().map(|sample| (sample.at, &sample.data)),
                 command: (heard > Instant::ZERO).then_some(heard),
                 // It has neither; that the barometer is silent, the watch need not know.

@@ -27,7 +27,7 @@ use stampfly_mode::failsafe::{Failsafe, FailsafeConfig, Following, FollowingConf
 use stampfly_mode::{FailsafeInput, decision};
 use stampfly_types::math::larger;
 use stampfly_types::messages::{
-    Alerts, ControlOutput, EstimatorStatus, ImuData, PowerData, SelfTestVerdict, SystemAlert,
+    Alerts, ControlOutput, EstimatorStatus, ImuData, PowerData, SelfTestVerdict, SensorFindings, SystemAlert,
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Stamped, Vec3, frame};
 
@@ -160,6 +160,7 @@ impl Protection {
                 imu: core::slice::from_ref(mean),
                 estimate: &family::estimate(attitude),
                 status: &EstimatorStatus::default(),
+                findings: &SensorFindings::default(),
                 power,
                 command: heard,
                 // It has none of them.

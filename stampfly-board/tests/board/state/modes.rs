@@ -80,6 +80,7 @@ fn failsafe_goes_on() {
             imu: if k % 200 > 15 { &imu } else { &[] },
             estimate: &estimate,
             status: &status,
+            findings: &SensorFindings::default(),
             power: (k.is_multiple_of(28)).then_some((at(k), &power)),
             command: Some(at(k - k % 250)),
             tof: Some(at(k - k % 350)),

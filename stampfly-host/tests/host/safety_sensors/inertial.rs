@@ -36,12 +36,12 @@ fn d7_an_inertial_sensor_that_dies_but_goes_on_delivering_stops_the_motors() {
 /// An accelerometer that dies while the gyro measures: name, and what it does to a sample.
 type AccelDeath = (&'static str, Box<dyn FnMut(f32, &mut ImuData)>);
 
-fn accel_deaths() -> [AccelDeath; 4] {
+/// Not one axis at full scale: that is a blow from the side.
+fn accel_deaths() -> [AccelDeath; 3] {
     let mut held: Option<Vec3> = None;
     [
         ("accel stuck", Box::new(move |_, imu: &mut ImuData| imu.accel = *held.get_or_insert(imu.accel))),
         ("accel zero", Box::new(|_, imu: &mut ImuData| imu.accel = Vec3::zeros())),
-        ("an axis at full scale", Box::new(|_, imu: &mut ImuData| imu.accel.y = 78.4)),
         ("one axis of the accel", Box::new(|_, imu: &mut ImuData| imu.accel.x = 0.0)),
     ]
 }

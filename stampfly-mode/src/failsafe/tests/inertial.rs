@@ -42,7 +42,8 @@ fn d7_an_inertial_sensor_that_is_stuck_stops_the_motors_within_50_ms() {
 
 #[test]
 fn an_accelerometer_that_is_stuck_beside_a_gyro_that_measures_ends_in_a_landing() {
-    for force in [REST * 1.01, Vec3::zeros(), Vec3::new(78.4, 0.1, -9.8)] {
+    // Not at full scale: from the side that is a blow.
+    for force in [REST * 1.01, Vec3::zeros(), Vec3::new(4.0, 0.1, -9.8)] {
         let mut rig = Rig::flying().settled();
         let mut seen = Alerts::NONE;
         for sample in 1..=800 {

@@ -54,6 +54,7 @@ impl Rig {
             imu: &[Stamped { at: self.now, generation: 1, data }],
             estimate: &above_any_ground(&self.estimate),
             status: &EstimatorStatus::default(),
+            findings: &SensorFindings::default(),
             power: Some((self.now, &power)),
             command: Some(self.now),
             tof: Some(self.now),

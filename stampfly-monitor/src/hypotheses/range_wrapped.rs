@@ -1,16 +1,21 @@
-//! Is the vehicle higher than the filter believes, by the barometer and since it stood?
+//! The vehicle is higher than the estimate, by the barometer and since it stood.
 //!
-//! A range that wraps below the height of a leg says for the whole of a take-off that the vehicle
-//! has hardly left the floor, and the controller pushes until it flies seven metres higher. Neither
-//! path nor observer look at the barometer that soon, because propellers that start change the
-//! pressure, and the more the nearer the floor is: by up to 0.6 m, in either direction. So does a
-//! door, by 1.5 m within a second. What tells a climb from a door is that it is felt: of the climb
-//! rate that the filter does not know of, the accelerometer has gained a share. Vibration takes the
-//! rest, and more than all of it from a vehicle that shakes hard. What neither propellers nor doors
-//! make is believed without it.
+//! A range that wraps below the height of a leg says for the whole of a take-off that the vehicle has
+//! hardly left the floor, and the controller pushes until it flies seven metres higher.
+//! [`range_drifts`](super::range_drifts) does not look at the barometer that soon, because propellers
+//! that start change the pressure, and the more the nearer the floor is: by up to 0.6 m, in either
+//! direction. So does a door, by 1.5 m within a second. What tells a climb from a door is that it is
+//! felt: of the climb rate that the estimate does not have, the accelerometer has gained a share.
+//! Vibration takes the rest, and more than all of it from a vehicle that shakes hard. What neither
+//! propellers nor doors make is believed without it.
 //!
-//! For [`LASTS`] after the take-off, because weather changes the pressure as well. Not for a vehicle
-//! that is lower than the filter believes.
+//! For ten seconds after the take-off, because weather changes the pressure as well. Not for a vehicle
+//! that is lower than the estimate.
+
+use crate::config::MonitorConfig;
+use crate::evidence::Evidence;
+use crate::hypothesis::{Hypothesis, Opinion, Sensor};
+use stampfly_types::messages::Finding;
 
 /// For so long after the vehicle stood, s.
 const LASTS: f32 = 10.0;
@@ -37,58 +42,78 @@ const SHORTEST: f32 = 0.005;
 /// the vehicle stands again.
 const STEP: f32 = 0.35;
 
-/// What is remembered since the vehicle stood.
+/// See the [module](self) documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Rise {
-    /// How long ago that was, s; `None` for a vehicle that has not stood.
+pub struct RangeWrapped {
+    /// How long ago the vehicle stood, s; `None` for one that has not stood.
     time: Option<f32>,
     /// How far the altitude has risen above where the vehicle stood, m.
     risen: f32,
     /// The same tracked, m, and how fast it rises, m/s.
     tracked: f32,
     climb: f32,
-    /// By how much more than the filter's height, m.
+    /// By how much more than the estimated height, m.
     above: f32,
     /// Bias of the upward acceleration where the vehicle stood, m/s², and the speed upwards that
     /// was felt lately with it, m/s.
     bias: f32,
     gained: f32,
-    /// The filter's climb rate, m/s.
+    /// The estimated climb rate, m/s.
     believed: f32,
 }
 
-impl Rise {
-    /// The same of a vehicle that stands with this bias of the upward acceleration, m/s².
-    pub(super) fn at_rest(self, bias: f32) -> Self {
-        Self { bias, ..self }
-    }
+impl Hypothesis for RangeWrapped {
+    const SENSOR: Sensor = Sensor::Range;
+    const FINDING: Finding = Finding::Disagrees;
 
+    fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
+        if seen.stands {
+            self.bias = -seen.estimate.accel_bias.z;
+        }
+        if let Some(block) = &seen.block {
+            self.felt(block.change, -seen.estimate.velocity.z, block.dt);
+        }
+        let Some(altitude) = &seen.altitude else { return Opinion::Unknown };
+        if altitude.stuck {
+            *self = Self { bias: self.bias, ..Self::default() };
+        } else if seen.stands {
+            self.stand(altitude.change, altitude.dt);
+        } else if seen.trusts_range {
+            self.baro(altitude.change, seen.estimate.height - config.ground_clearance_m, altitude.dt);
+        }
+        match self.is_above().filter(|_| seen.trusts_range && !seen.stands) {
+            Some((higher, climb)) => Opinion::Holds(Some(seen.climbs(higher, climb))),
+            None => Opinion::Unknown,
+        }
+    }
+}
+
+impl RangeWrapped {
     /// The upward velocity has changed by this much within `dt` seconds, no bias removed; the
-    /// filter's climb rate.
-    #[inline]
-    pub(super) fn felt(&mut self, change: f32, climb: f32, dt: f32) {
+    /// estimated climb rate.
+    fn felt(&mut self, change: f32, climb: f32, dt: f32) {
         self.gained += change - (self.bias + self.gained * (1.0 / GAINS)) * dt;
         self.believed = climb;
     }
 
     /// The altitude of a vehicle that stands has changed by this much within `dt` seconds.
-    pub(super) fn stand(&mut self, change: f32, dt: f32) {
+    fn stand(&mut self, change: f32, dt: f32) {
         if change > STEP {
-            *self = Self::default();
+            *self = Self { bias: self.bias, ..Self::default() };
             return;
         }
         let risen = (self.risen + change) * (STANDS / (STANDS + dt));
         *self = Self { time: Some(0.0), risen, tracked: risen, bias: self.bias, ..Self::default() };
     }
 
-    /// The altitude has changed by this much within `dt` seconds; the filter believes to be so high
-    /// above where it stood.
-    pub(super) fn baro(&mut self, change: f32, height: f32, dt: f32) {
+    /// The altitude has changed by this much within `dt` seconds; the estimate is so high above where
+    /// the vehicle stood.
+    fn baro(&mut self, change: f32, height: f32, dt: f32) {
         let Some(time) = &mut self.time else { return };
         *time += dt;
         if *time > LASTS || change > STEP {
-            *self = Self::default();
+            *self = Self { bias: self.bias, ..Self::default() };
             return;
         }
         self.risen += change;
@@ -101,9 +126,9 @@ impl Rise {
         self.above = self.tracked - height;
     }
 
-    /// If the vehicle is too much higher than the filter believes: by how much at least, m, and how
-    /// fast it climbs, m/s.
-    pub(super) fn is_above(&self) -> Option<(f32, f32)> {
+    /// If the vehicle is too much higher than the estimate: by how much at least, m, and how fast it
+    /// climbs, m/s.
+    fn is_above(&self) -> Option<(f32, f32)> {
         let unknown = self.climb - self.believed;
         let felt = unknown > CLIMBS && self.gained - self.believed > FELT * unknown;
         let limit = if felt { ABOVE } else { ABOVE + DOOR };
@@ -125,7 +150,7 @@ mod tests {
         height: impl Fn(f32) -> f32,
         acceleration: impl Fn(f32) -> f32,
     ) -> Option<f32> {
-        let mut rise = Rise::default().at_rest(0.2);
+        let mut rise = RangeWrapped { bias: 0.2, ..Default::default() };
         rise.stand(0.0, DT);
         (1..500u16).map(|n| f32::from(n) * DT).find(|now| {
             let believed = (height(*now) - height(now - DT)) / DT;
@@ -175,7 +200,7 @@ mod tests {
         let starts = |now: f32| if now > 0.0 { climbs(now) + wash(climbs(now)) } else { 0.0 };
         assert_eq!(found(starts, climbs), None, "though they start within a reading");
         assert_eq!(found(|now| if now > 1.0 { 2.0 } else { 0.0 }, |_| 0.0), None, "nor a step");
-        let mut stepped = Rise::default();
+        let mut stepped = RangeWrapped::default();
         stepped.stand(0.0, DT);
         // Propellers have started within the same reading.
         stepped.stand(2.4, DT);
@@ -186,7 +211,7 @@ mod tests {
 
     #[test]
     fn propellers_that_start_while_it_stands_are_no_rise_when_it_leaves_the_ground() {
-        let mut rise = Rise::default();
+        let mut rise = RangeWrapped::default();
         rise.stand(-0.6, DT);
         (0..3).for_each(|_| rise.stand(0.0, DT));
         let climbs = |n: u16| (0.02 * f32::from(n)).min(0.5);
@@ -200,7 +225,7 @@ mod tests {
     #[test]
     fn what_begins_later_is_left_to_others() {
         assert_eq!(found(|now| 0.3 * (now - LASTS).max(0.0), |_| 0.0), None);
-        let mut rise = Rise::default();
+        let mut rise = RangeWrapped::default();
         (0..20).for_each(|_| rise.baro(0.2, 0.0, DT));
         assert_eq!(rise.is_above(), None, "it has not stood");
     }

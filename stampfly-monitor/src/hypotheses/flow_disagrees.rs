@@ -1,0 +1,69 @@
+//! Flow's velocity grows in another way than the one that is reckoned.
+//!
+//! Its residual against a reckoner exceeds the gate, and a shift of the gyro's zero is not the better
+//! explanation ([`course`](crate::course)). Axes that are reversed, swapped or dead, and an offset
+//! from the take-off on, are found so.
+//!
+//! Not for an error of scale within the spread of cameras, nor for an offset that was there before
+//! the reckoner began: no other sensor measures a constant velocity.
+
+use crate::config::MonitorConfig;
+use crate::course::Explanation;
+use crate::evidence::Evidence;
+use crate::hypothesis::{Hypothesis, Opinion, Sensor};
+use stampfly_types::messages::Finding;
+
+/// A course that neither explains counts against the camera after this time, s: within it, a shift
+/// of the gyro's zero that has just begun has made a course of its own.
+const UNCLEAR: f32 = 0.3;
+/// The same where a shift explains it, and others nearly as well: their courses part later.
+const PERHAPS_GYRO: f32 = 0.8;
+
+/// See the [module](self) documentation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlowDisagrees {
+    /// How long the residual has exceeded the gate, s.
+    exceeds: f32,
+    /// It did since the vehicle stood. What agrees with later motions may be an offset, so this holds
+    /// until it stands again.
+    since_stood: bool,
+}
+
+impl Hypothesis for FlowDisagrees {
+    const SENSOR: Sensor = Sensor::Flow;
+    const FINDING: Finding = Finding::Disagrees;
+
+    fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
+        let Some(flow) = &seen.flow else { return Opinion::Unknown };
+        if seen.stands {
+            *self = Self::default();
+            return Opinion::Unknown;
+        }
+        if self.since_stood {
+            return Opinion::Holds(None);
+        }
+        if !flow.comparable || !seen.settled {
+            self.exceeds = 0.0;
+            return Opinion::Unknown;
+        }
+        self.exceeds = if flow.ratio > 1.0 { self.exceeds + flow.interval } else { 0.0 };
+        let course = seen.course(seen.reckoners.older());
+        if self.exceeds < config.lasts_s {
+            return match course.agrees(config.flow_motion_m_s) {
+                None => Opinion::Unknown,
+                Some(true) => Opinion::Fits,
+                Some(false) => Opinion::Misfits,
+            };
+        }
+        match course.explanation(&seen.limits(config, seen.reckoners.older(), flow.distance)) {
+            Explanation::Gyro(_) | Explanation::Tilt => Opinion::Misfits,
+            Explanation::Unclear if self.exceeds < UNCLEAR => Opinion::Misfits,
+            Explanation::PerhapsGyro if self.exceeds < PERHAPS_GYRO => Opinion::Misfits,
+            Explanation::Unclear | Explanation::PerhapsGyro | Explanation::Camera => {
+                self.since_stood = seen.reckoners.get(seen.reckoners.older()).stood;
+                Opinion::Holds(Some(seen.back_to_reckoned()))
+            }
+        }
+    }
+}

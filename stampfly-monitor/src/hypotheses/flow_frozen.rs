@@ -1,0 +1,32 @@
+//! The camera repeats one reading that is not zero: its registers are read, and it has stopped.
+
+use crate::config::MonitorConfig;
+use crate::evidence::Evidence;
+use crate::hypothesis::{Hypothesis, Opinion, Sensor};
+use stampfly_types::messages::Finding;
+
+/// See the [module](self) documentation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlowFrozen {
+    reading: [f32; 2],
+    repeats: u32,
+}
+
+impl Hypothesis for FlowFrozen {
+    const SENSOR: Sensor = Sensor::Flow;
+    const FINDING: Finding = Finding::Stuck;
+
+    fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
+        let Some(flow) = &seen.flow else { return Opinion::Unknown };
+        let repeats = flow.counts == self.reading && flow.counts != [0.0; 2];
+        self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
+        self.reading = flow.counts;
+        // On the ground nothing moves, and flow is not used.
+        if self.repeats >= config.flow_repeats && !seen.stands {
+            Opinion::Holds(Some(seen.back_to_reckoned()))
+        } else {
+            Opinion::Unknown
+        }
+    }
+}

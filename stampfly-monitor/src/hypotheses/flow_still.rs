@@ -1,0 +1,48 @@
+//! The camera shows no motion at all while the body turns below it.
+//!
+//! It is covered, or sees no features and does not say so. A picture can stand still over a body that
+//! turns only if the vehicle moves by turn times distance the other way. One that is carried does so
+//! by millimetres.
+
+use crate::config::MonitorConfig;
+use crate::evidence::Evidence;
+use crate::hypothesis::{Hypothesis, Opinion, Sensor};
+use stampfly_types::math;
+use stampfly_types::messages::Finding;
+
+/// See the [module](self) documentation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlowStill {
+    /// Readings of nothing that are running, and the largest turn of the body meanwhile, rad.
+    zeros: u32,
+    turn: [f32; 2],
+    turned: f32,
+}
+
+impl Hypothesis for FlowStill {
+    const SENSOR: Sensor = Sensor::Flow;
+    const FINDING: Finding = Finding::Blind;
+
+    fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
+        let Some(flow) = &seen.flow else { return Opinion::Unknown };
+        if flow.counts != [0.0; 2] || flow.distance < config.flow_sharp_m || seen.stands {
+            *self = Self::default();
+            return Opinion::Unknown;
+        }
+        self.zeros = self.zeros.saturating_add(1);
+        for (turn, rate) in self.turn.iter_mut().zip(flow.turning) {
+            *turn += rate * flow.interval;
+            self.turned = math::larger(self.turned, turn.abs());
+        }
+        if self.zeros < config.flow_zeros {
+            return Opinion::Unknown;
+        }
+        if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
+            Opinion::Holds(Some(seen.back_to_reckoned()))
+        } else {
+            // What stands still agrees with nothing.
+            Opinion::Misfits
+        }
+    }
+}

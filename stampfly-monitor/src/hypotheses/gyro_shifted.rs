@@ -1,0 +1,67 @@
+//! The gyro's zero has shifted in the air, or a burst of it has turned the attitude, which shows as a
+//! course of the camera's velocity.
+//!
+//! The residual of the camera exceeds its gate and has the course that a shift makes, and no fault of the
+//! camera makes it as well ([`course`](crate::course)). The camera is the sensor that is right then.
+//!
+//! Not for a jump that shows in a single sample: [`gyro_jumped`](super::gyro_jumped) takes 50 ms.
+
+use crate::config::MonitorConfig;
+use crate::course::Explanation;
+use crate::evidence::Evidence;
+use crate::hypothesis::{Hypothesis, Opinion, Sensor};
+use stampfly_types::messages::{EstimateCorrection, Finding};
+use stampfly_types::{Vec3, math};
+
+/// Share of a shift that the fit leaves uncertain.
+const UNCERTAIN: f32 = 0.1;
+
+/// See the [module](self) documentation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GyroShifted {
+    /// How long the residual has exceeded the gate, s.
+    exceeds: f32,
+}
+
+impl Hypothesis for GyroShifted {
+    const SENSOR: Sensor = Sensor::Gyro;
+    const FINDING: Finding = Finding::Shifted;
+
+    fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
+        let Some(flow) = &seen.flow else { return Opinion::Unknown };
+        if seen.stands || !flow.comparable || !seen.settled {
+            self.exceeds = 0.0;
+            return Opinion::Unknown;
+        }
+        self.exceeds = if flow.ratio > 1.0 { self.exceeds + flow.interval } else { 0.0 };
+        if self.exceeds < config.lasts_s {
+            return Opinion::Unknown;
+        }
+        let older = seen.reckoners.older();
+        let limits = seen.limits(config, older, flow.distance);
+        let Explanation::Gyro(shift) = seen.course(older).explanation(&limits) else {
+            return Opinion::Unknown;
+        };
+        self.exceeds = 0.0;
+        let reckoner = seen.reckoners.get(older);
+        let [north, east] = shift.rate;
+        // Since the last point the shift has turned it on.
+        let since = reckoner.age - shift.at;
+        let turn = Vec3::new(shift.turn[0] - north * since, shift.turn[1] - east * since, 0.0);
+        // The camera is right, but for the rotation that it was compensated for.
+        let [x, y] = flow.smooth.get(older).copied().unwrap_or_default();
+        let velocity = Vec3::new(x + flow.distance * east, y - flow.distance * north, 0.0);
+        let rate = reckoner.attitude.inverse_transform_vector(&Vec3::new(north, east, 0.0));
+        let reckoned = seen.back_to(older);
+        Opinion::Holds(Some(EstimateCorrection {
+            turn: reckoned.turn + turn,
+            velocity: reckoned.velocity + velocity,
+            gyro_bias: reckoned.gyro_bias + rate,
+            tilt_sigma: math::larger(reckoned.tilt_sigma, UNCERTAIN * turn.norm()),
+            gyro_bias_sigma: UNCERTAIN * rate.norm(),
+            velocity_sigma: config.velocity_sigma_m_s,
+            ..reckoned
+        }))
+    }
+}

@@ -1,0 +1,41 @@
+//! Faults of the range finder, and doors.
+
+use crate::body::{Flight, Readings, VEHICLES};
+use stampfly_types::messages::Finding;
+
+/// What is found when a fault begins after six seconds in the air.
+fn found(fault: impl Fn(&mut Readings) + Copy) -> Vec<Option<(Finding, f32)>> {
+    let flights = (1..4).map(|seed| {
+        let mut flight = Flight::new(VEHICLES[0], seed);
+        assert_eq!(flight.until_found(6.0, |_| ()), None);
+        flight.until_found(6.0, fault).map(|(findings, after)| (findings.range.finding, after))
+    });
+    flights.collect()
+}
+
+#[test]
+fn what_jumps_and_stays_there_is_a_jump() {
+    for found in found(|readings| readings.range -= 0.4) {
+        let (finding, after) = found.expect("found");
+        assert_eq!(finding, Finding::Jumped);
+        assert!(after < 0.25, "{after} s");
+    }
+}
+
+#[test]
+fn what_stays_at_a_value_is_stuck() {
+    for found in found(|readings| readings.range = 0.6) {
+        let (finding, after) = found.expect("found");
+        assert_eq!(finding, Finding::Stuck);
+        assert!(after < 2.0, "{after} s");
+    }
+}
+
+#[test]
+fn a_door_convicts_no_range() {
+    for rise in [1.5, -1.5] {
+        for found in found(|readings| readings.altitude += rise * (readings.time / 0.8).min(1.0)) {
+            assert_eq!(found, None, "{rise} m");
+        }
+    }
+}
