@@ -15,16 +15,53 @@ pub const WRONG: Place = ("docs/safety.md", "<!-- wrong: cargo xtask docs --fix 
 /// Sticks of people.
 pub const STICKS: Place = ("docs/safety.md", "<!-- sticks: cargo xtask docs --fix -->\n", "<!-- end of sticks -->");
 
+/// What each hypothesis of the monitor is worth.
+pub const ABLATION: Place =
+    ("docs/safety.md", "<!-- ablation: cargo xtask docs --fix -->\n", "<!-- end of ablation -->");
+
+/// The campaign with all hypotheses of the monitor, and the beginning of the names of those without one.
+pub const ALL: &str = "monitor: all hypotheses";
+pub const WITHOUT: &str = "monitor: without ";
+
 /// The verdict of a flight whose only mistake was to stop its motors.
 const NEEDLESS: &str = "needless-cut";
 
 /// Every table with its place.
-pub fn tables(results: &Results) -> [(Place, String); 3] {
-    [(RATES, rates(results)), (WRONG, wrong(results)), (STICKS, sticks(results))]
+pub fn tables(results: &Results) -> [(Place, String); 4] {
+    let ablation = (ABLATION, ablation(results));
+    [(RATES, rates(results)), (WRONG, wrong(results)), (STICKS, sticks(results)), ablation]
+}
+
+/// Is it one of the campaigns about the monitor's hypotheses?
+fn ablates(result: &Found) -> bool {
+    result.name == ALL || result.name.starts_with(WITHOUT)
+}
+
+fn ablation(results: &Results) -> String {
+    let Some(all) = results.of(ALL) else { return "\n".into() };
+    let wrong = |found: &Found| found.report["faulted"]["wrong_end"]["count"].as_u64().unwrap_or(0);
+    let needless = |found: &Found| found.report["needless_cuts"].as_u64().unwrap_or(0);
+    let flights = all.report["faulted"]["wrong_end"]["of"].as_u64().unwrap_or(0);
+    let mut text = format!(
+        "\n```console\n$ {}\n```\n\n| without | wrong ends of {} | more than with all | of these flights | needless cuts |\n\
+         |---|---|---|---|---|\n| none | {} | | | {} |\n",
+        all.line,
+        thousands(flights),
+        wrong(all),
+        needless(all)
+    );
+    for found in results.results.iter().filter(|result| result.name.starts_with(WITHOUT)) {
+        let name = found.name.strip_prefix(WITHOUT).unwrap_or_default();
+        let more = wrong(found).cast_signed() - wrong(all).cast_signed();
+        let share = 100.0 * more as f64 / flights.max(1) as f64;
+        let _ = writeln!(text, "| {} | {} | {more} | {share:.2} % | {} |", code(name), wrong(found), needless(found));
+    }
+    text + "\n"
 }
 
 fn rates(results: &Results) -> String {
-    let faults: Vec<_> = results.results.iter().filter(|result| result.report.get("faulted").is_some()).collect();
+    let faults: Vec<_> =
+        results.results.iter().filter(|result| result.report.get("faulted").is_some() && !ablates(result)).collect();
     let mut text = format!("\nFlown by {}:\n\n```console\n", results.flown_by);
     for result in &faults {
         let _ = writeln!(text, "$ {}", result.line);
@@ -227,6 +264,20 @@ mod tests {
         let row = "| recordings | 156 | 133 of 156, 1.00 % (0.50 to 2.00 %) | `IMU_FAULTY` cuts 16, `FLOW_IMPLAUSIBLE` changes the mode in 1 |";
         assert!(sticks.contains(row) && !sticks.contains("usual sizes"), "{sticks}");
         assert!(sticks.contains("| recordings | `15` | acro | 3 | `IMU_FAULTY` cuts 2 |"), "{sticks}");
+    }
+
+    #[test]
+    fn what_a_hypothesis_is_worth_is_what_ends_wrong_without_it() {
+        let mut results = results();
+        let report = |wrong: u64| {
+            let end = json!({ "count": wrong, "of": 3_000, "rate": 0.01, "low": 0.005, "high": 0.02 });
+            json!({ "flights": 3_000, "needless_cuts": 4, "faulted": { "flights": 3_000, "failed": end, "wrong_end": end } })
+        };
+        results.put(ALL, "stampfly campaign --only tof-stuck", &report(40));
+        results.put(&format!("{WITHOUT}range_stuck"), "stampfly campaign", &report(55));
+        let table = ablation(&results);
+        assert!(table.contains("| none | 40 | | | 4 |\n| `range_stuck` | 55 | 15 | 0.50 % | 4 |"), "{table}");
+        assert!(!rates(&results).contains("monitor:"));
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`,
 //! and prints the tables.
 //!
-//! Takes ten to twenty minutes, so it is in no lane; the document says with which commit it was
+//! Takes half an hour on two cores, so it is in no lane; the document says with which commit it was
 //! made. Names of campaigns on the command line fly these alone. The recordings of pilots need the
 //! folder of recorded flights.
+//!
+//! One campaign more for each hypothesis of the monitor leaves it out: what ends wrong then and not
+//! with all of them is what it is worth.
 //!
 //! What keeps the tables up to date: [`docs`](super::docs) compares the document with the file, and
 //! says when the golden flight has changed since; [`campaign`](super::campaign) flies the first
@@ -13,8 +16,9 @@
 use super::program::released;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, announced, capture, json};
-use crate::safety::page::tables;
+use crate::safety::page::{ALL, WITHOUT, tables};
 use crate::safety::results::{Results, golden};
+use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -48,17 +52,26 @@ const CAMPAIGNS: &[(&str, &[&str])] = &[
     ),
 ];
 
+/// Where the monitor's hypotheses are listed, and what stands before and after them.
+const HYPOTHESES: (&str, &str, &str) = ("stampfly-monitor/src/monitor.rs", "\nhypotheses! {\n", "\n}");
+/// Faults of the sensors that they are about, and what else looks like one of them.
+const JUDGED: &str = "gyro-bias,gyro-spikes,imu-garbage,\
+                      tof-stuck,tof-bias,tof-scale,tof-alias,tof-outliers,slope,edge,baro-stuck,baro-step,\
+                      flow-stuck,flow-zero,flow-reversed,flow-swapped,flow-bias,floor-dark,floor-moves";
+
 pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure> {
-    let names = || CAMPAIGNS.iter().map(|(name, _)| *name);
+    let campaigns = campaigns(repository)?;
+    let names = || campaigns.iter().map(|(name, _)| name.as_str());
     if let Some(unknown) = arguments.rest.iter().find(|name| !names().any(|known| known == name.as_str())) {
         return Err(format!("no campaign `{unknown}`; there are: {}", names().collect::<Vec<_>>().join("; ")));
     }
     let program = released(repository)?;
     let mut results = Results::read(repository).unwrap_or_default();
     let chosen = |name: &str| arguments.rest.is_empty() || arguments.rest.iter().any(|chosen| chosen == name);
-    for (name, words) in CAMPAIGNS.iter().filter(|(name, _)| chosen(name)) {
+    for (name, line) in campaigns.iter().filter(|(name, _)| chosen(name)) {
+        let words: Vec<_> = line.iter().map(String::as_str).collect();
         let data = repository.data();
-        let Some(words) = with_data(words, data.as_deref()) else {
+        let Some(words) = with_data(&words, data.as_deref()) else {
             println!("{name}: left as it is, there is no folder of recorded flights");
             continue;
         };
@@ -69,7 +82,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         {
             report.remove("failures");
         }
-        results.put(name, &line(name), &report);
+        results.put(name, &format!("stampfly campaign {}", line.join(" ")), &report);
     }
     results.flown_by = flown_by(repository)?;
     results.golden = golden(repository)?;
@@ -81,10 +94,28 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     Ok(())
 }
 
-/// The command of a campaign, as documents have it.
-pub fn line(name: &str) -> String {
-    let words = CAMPAIGNS.iter().find(|(known, _)| *known == name).map_or(&[][..], |(_, words)| *words);
-    format!("stampfly campaign {}", words.join(" "))
+/// Names and arguments of all campaigns, those that leave a hypothesis out included.
+fn campaigns(repository: &Repository) -> Result<Vec<(String, Vec<String>)>, Failure> {
+    let owned = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+    let mut campaigns: Vec<_> = CAMPAIGNS.iter().map(|(name, words)| ((*name).to_owned(), owned(words))).collect();
+    let judged = owned(&["--faults", "--drawn", "--flights", "3000", "--seed", "50001", "--only", JUDGED]);
+    campaigns.push((ALL.to_owned(), judged.clone()));
+    let (file, begin, end) = HYPOTHESES;
+    let text = fs::read_to_string(repository.root.join(file)).map_err(|e| format!("{file}: {e}"))?;
+    let names = hypotheses(&text, begin, end).ok_or_else(|| format!("{file} has no list of hypotheses"))?;
+    for (bit, name) in names.iter().enumerate() {
+        let without = ["--param".to_owned(), format!("monitor.without={}", 1 << bit)];
+        campaigns.push((format!("{WITHOUT}{name}"), [&judged[..], &without].concat()));
+    }
+    Ok(campaigns)
+}
+
+/// The names in the list between these two texts.
+fn hypotheses<'t>(text: &'t str, begin: &str, end: &str) -> Option<Vec<&'t str>> {
+    let (_, list) = text.split_once(begin)?;
+    let (list, _) = list.split_once(end)?;
+    let names = list.lines().map(str::trim).filter(|line| !line.starts_with("//"));
+    names.map(|line| Some(line.split_once(':')?.0)).collect()
 }
 
 /// The arguments with the folder of recorded flights; `None` where it is missing and needed.
@@ -128,7 +159,15 @@ mod tests {
 
     #[test]
     fn the_first_campaign_has_the_flights_that_every_night_has() {
-        assert_eq!(line(FIRST), format!("stampfly campaign --faults --flights {FLIGHTS}"));
+        let (_, words) = CAMPAIGNS.first().expect("one");
+        assert_eq!(words.join(" "), format!("--faults --flights {FLIGHTS}"));
+    }
+
+    #[test]
+    fn the_hypotheses_are_those_of_the_list() {
+        let text = "macro\nlist {\n    // The gyro first.\n    one: One,\n    two_more: TwoMore,\n}\n";
+        assert_eq!(hypotheses(text, "\nlist {\n", "\n}"), Some(vec!["one", "two_more"]));
+        assert_eq!(hypotheses("none", "\nlist {\n", "\n}"), None);
     }
 
     #[test]
