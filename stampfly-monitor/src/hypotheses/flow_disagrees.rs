@@ -19,7 +19,7 @@ const UNCLEAR: f32 = 0.3;
 /// The same where a shift explains it, and others nearly as well: their courses part later.
 const PERHAPS_GYRO: f32 = 0.8;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowDisagrees {

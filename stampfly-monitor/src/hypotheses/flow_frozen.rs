@@ -5,7 +5,7 @@ use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowFrozen {

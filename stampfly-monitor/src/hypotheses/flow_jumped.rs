@@ -21,7 +21,7 @@ const SPAN: f32 = 0.15;
 /// then, and a jump of the gyro's zero, which looks the same, is found and undone.
 const WAITS: f32 = 0.1;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowJumped {

@@ -8,7 +8,7 @@ use stampfly_types::messages::Finding;
 /// A vehicle that turns faster, rad/s, is carried.
 const TURNS: f32 = 0.5;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStanding {

@@ -10,7 +10,7 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStill {

@@ -69,7 +69,7 @@ struct Found {
     velocity: Vec3,
 }
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroJumped {

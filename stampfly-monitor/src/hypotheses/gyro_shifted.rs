@@ -16,7 +16,7 @@ use stampfly_types::{Vec3, math};
 /// Share of a shift that the fit leaves uncertain.
 const UNCERTAIN: f32 = 0.1;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroShifted {

@@ -20,7 +20,7 @@ const LASTS: f32 = 0.5;
 /// Below this height the pressure under the propellers changes with it, m.
 const NEAR: f32 = 0.35;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeDrifts {

@@ -24,7 +24,7 @@ const AGREES: f32 = 0.15;
 /// A reading that repeats itself so often agrees with nothing.
 const REPEATED: u32 = 15;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeJumped {

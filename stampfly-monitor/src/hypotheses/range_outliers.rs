@@ -13,7 +13,7 @@ const FADES: f32 = 0.4;
 /// three seconds.
 const MOVES: u32 = 3;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeOutliers {

@@ -22,7 +22,7 @@ const ALWAYS: u32 = 45;
 /// StampFlys repeat one 24 times there.
 const FROM_GROUND: u32 = 90;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeStuck {

@@ -42,7 +42,7 @@ const SHORTEST: f32 = 0.005;
 /// the vehicle stands again.
 const STEP: f32 = 0.35;
 
-/// See the [module](self) documentation.
+/// See the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeWrapped {
