@@ -74,8 +74,6 @@ const MAX_STEP: f32 = 0.5;
 /// 400 Hz with every fourth one, for a quarter of the work. The covariance changes in tenths of seconds. (PX4's EKF2 takes
 /// 10 ms, too: `EKF2_PREDICT_US`.)
 const COVARIANCE_STEP: f32 = 9e-3;
-/// A vehicle that is told to fly stands until it is this much higher, m.
-const LIFTED: f32 = 0.008;
 /// Largest standard deviation of a velocity that the vehicle brakes by, m/s.
 const BRAKES: f32 = 1.5;
 /// Below this height, m, the ground may carry it, and what it feels is no drag: it comes down level.
@@ -147,8 +145,6 @@ pub struct Eskf {
     /// Direction of the magnetic field, world.
     field: Option<Vec3>,
     initialized: bool,
-    /// It has not left the place where it last stood.
-    rests: bool,
     steps: u32,
     rate: Vec3,
     force: Vec3,
@@ -219,7 +215,6 @@ impl Eskf {
             calibration: CalibrationResult::default(),
             command: EstimatorCommand::default(),
             anchor: None,
-            rests: false,
             surface: None,
             baro_offset: None,
             baro_updated: Instant::ZERO,
@@ -273,7 +268,6 @@ impl Eskf {
             calibration,
             command,
             anchor,
-            rests,
             surface,
             baro_offset,
             baro_updated,
@@ -311,7 +305,6 @@ impl Eskf {
         *calibration = CalibrationResult::default();
         *command = EstimatorCommand::default();
         *anchor = None;
-        *rests = false;
         *surface = None;
         *baro_offset = None;
         *baro_updated = Instant::ZERO;

@@ -101,6 +101,8 @@ pub struct Evidence<'a> {
     pub trusts_flow: bool,
     /// The inertial samples are believed: the estimator has bridged none of them lately.
     pub trusts_samples: bool,
+    /// The gyro's zero was found to have shifted in the air some seconds ago.
+    pub shifted_lately: bool,
     /// Neither the start in the air nor a correction is so recent that the estimate is still finding
     /// itself.
     pub settled: bool,
@@ -165,6 +167,12 @@ impl Evidence<'_> {
     /// What takes the estimate back to the older reckoner.
     pub(crate) fn back_to_reckoned(&self) -> EstimateCorrection {
         self.back_to(self.reckoners.older())
+    }
+
+    /// The same where the reckoner is worth something.
+    pub(crate) fn back_to_comparable(&self) -> Option<EstimateCorrection> {
+        let comparable = self.settled && self.flow.is_some_and(|flow| flow.comparable);
+        comparable.then(|| self.back_to_reckoned())
     }
 
     /// What takes the estimate back to a reckoner.
@@ -287,7 +295,8 @@ impl Recollection {
         let picture = square(rates[0]) + square(rates[1]) + square(turning[0]) + square(turning[1]);
         let change = self.reckoners.turning_change();
         let fast = if self.turns_fast { config.flow_calm_rad_s } else { config.flow_fastest_rad_s };
-        self.turns_fast = square(turning[0]) + square(turning[1]) > square(fast);
+        let rate = raw - estimate.gyro_bias;
+        self.turns_fast = square(rate.x) + square(rate.y) > square(fast);
         let frames = square(config.flow_frame_share * distance) * picture;
         let late = square(config.flow_late_s * distance) * (square(change.x) + square(change.y));
         // It leaves the difference as it came in: of squares, twice as fast.

@@ -135,7 +135,7 @@ impl Monitor {
     /// Takes a step.
     pub fn step(&mut self, now: Instant, input: &MonitorInput<'_>) {
         self.hold_back(now, input);
-        if !input.estimate.sensors.contains(SensorMask::IMU) {
+        if !input.estimate.sensors.contains(SensorMask::IMU) || !is_finite(input.estimate, input.status) {
             return;
         }
         let (bridge, trusted) = (self.bridge(input.imu), self.trusted());
@@ -152,6 +152,9 @@ impl Monitor {
             flow.comparable &= input.felt;
         }
         recollection.inertial(config, samples, estimate, status, stands);
+        if !input.felt {
+            recollection.begin(estimate, Sigmas::default());
+        }
         let range = vertical.range(now, input.tof.last().map(|sample| &sample.data), estimate, status);
         let altitude = vertical.altitude(input.baro.last(), stands);
         let block = vertical.inertial(now, samples, estimate, stands, trusted.range);
@@ -180,6 +183,7 @@ impl Monitor {
             ground_clearance: config.ground_clearance_m,
             trusts_flow: trusted.flow,
             trusts_samples: self.bridged == 0.0,
+            shifted_lately: self.hypotheses.gyro_shifted.was_lately(now),
             settled: self.waits == 0.0,
         };
         let mut answers = Answers { findings: &mut self.findings, fits: [None; 2], correction: None, gyro: false, now };
@@ -281,13 +285,38 @@ impl Monitor {
         if correction.tilt_sigma == 0.0 {
             return;
         }
-        self.waits = SETTLES;
+        self.waits = math::larger(self.waits, SETTLES);
         let sigmas = Sigmas {
             velocity: correction.velocity_sigma,
             acceleration: GRAVITY * correction.tilt_sigma + self.config.accel_sigma_m_s2,
             gyro_bias: correction.gyro_bias_sigma,
         };
         self.recollection.begin(&corrected, sigmas);
+    }
+}
+
+/// Are these numbers?
+fn is_finite(estimate: &StateEstimate, status: &EstimatorStatus) -> bool {
+    let StateEstimate { attitude, position, velocity, gyro_bias, accel_bias, height, .. } = estimate;
+    let vectors = position.norm_squared() + velocity.norm_squared() + gyro_bias.norm_squared();
+    let [x, y] = status.flow_innovation;
+    (vectors + accel_bias.norm_squared() + attitude.norm_squared() + height + x + y).is_finite()
+}
+
+/// Two corrections of one step: camera and gyro put right what is horizontal, ranges what is vertical.
+fn both(first: &EstimateCorrection, second: &EstimateCorrection) -> EstimateCorrection {
+    EstimateCorrection {
+        number: 0,
+        turn: first.turn + second.turn,
+        velocity: first.velocity + second.velocity,
+        down: first.down + second.down,
+        unconfirmed: first.unconfirmed + second.unconfirmed,
+        gyro_bias: first.gyro_bias + second.gyro_bias,
+        accel_bias: first.accel_bias + second.accel_bias,
+        tilt_sigma: math::larger(first.tilt_sigma, second.tilt_sigma),
+        velocity_sigma: math::larger(first.velocity_sigma, second.velocity_sigma),
+        gyro_bias_sigma: math::larger(first.gyro_bias_sigma, second.gyro_bias_sigma),
+        climb_sigma: math::larger(first.climb_sigma, second.climb_sigma),
     }
 }
 
@@ -311,10 +340,10 @@ struct Answers<'a> {
 
 impl Answers<'_> {
     /// Asks a hypothesis. When it begins to hold, its sensor has that finding, and the estimate is put
-    /// right; the first one that asks for that in a step is the one that does.
+    /// right.
     fn ask<H: Hypothesis>(&mut self, hypothesis: &mut H, config: &MonitorConfig, seen: &Evidence<'_>) {
         // What looked like the camera was the gyro; and a vehicle without a range finder has none that is wrong.
-        if H::SENSOR == Sensor::Flow && self.gyro || H::SENSOR == Sensor::Range && !seen.has_range {
+        if H::SENSOR != Sensor::Range && self.gyro || H::SENSOR == Sensor::Range && !seen.has_range {
             return;
         }
         let opinion = hypothesis.step(config, seen);
@@ -342,7 +371,10 @@ impl Answers<'_> {
         let begins = health.finding == Finding::None || H::FINDING == Finding::Shifted;
         if begins {
             *health = Health { finding: H::FINDING, since: self.now };
-            self.correction = self.correction.or(correction);
+            self.correction = match (self.correction, correction) {
+                (Some(first), Some(second)) => Some(both(&first, &second)),
+                (first, second) => first.or(second),
+            };
         }
     }
 }

@@ -16,7 +16,7 @@ use stampfly_types::{GRAVITY, Instant, Quat, Stamped, Vec3, math};
 pub const HALF: f32 = 1.5;
 /// Samples are integrated in blocks of this length, s: four at 400 Hz.
 const BLOCK: f32 = 9e-3;
-/// A gap in the samples counts as this long at most, s.
+/// After a longer gap in the samples nothing is reckoned on from before it, s.
 const LONGEST_STEP: f32 = 0.05;
 
 /// One standard deviation each of what a reckoner begins with.
@@ -201,9 +201,11 @@ impl Reckoners {
         sigmas: Sigmas,
         stands: bool,
     ) -> Restart {
+        let mut gap = false;
         for Stamped { at, data, .. } in samples {
             let last = self.last.replace(*at).unwrap_or(*at);
-            let dt = math::smaller(at.since(last).seconds(), LONGEST_STEP);
+            let dt = at.since(last).seconds();
+            gap |= dt > LONGEST_STEP;
             // A sample that is no number says nothing about its time.
             if !(data.accel.norm_squared() + data.gyro.norm_squared()).is_finite() {
                 continue;
@@ -211,6 +213,11 @@ impl Reckoners {
             self.elapsed += dt;
             self.rate += data.gyro * dt;
             self.force += data.accel * dt;
+        }
+        if gap {
+            // What the vehicle did meanwhile is not known.
+            self.begin(estimate, sigmas, stands);
+            return Restart::Both;
         }
         if self.elapsed < BLOCK {
             return Restart::Neither;

@@ -10,6 +10,8 @@ const RANGE: usize = 0;
 const BLOCK: f32 = 9e-3;
 /// A gap in the samples counts as this long at most, s.
 const LONGEST_STEP: f32 = 0.05;
+/// Without an altitude for so long nothing is compared with the barometer, s: a dozen readings.
+const NO_ALTITUDE: f32 = 0.5;
 /// Two ranges are at most so far apart, s.
 const LONGEST: f32 = 0.2;
 /// A range that has not been used for so long holds neither height nor climb rate, s: six readings.
@@ -137,6 +139,11 @@ impl Vertical {
         let (dt, force) = (core::mem::take(&mut self.elapsed), core::mem::take(&mut self.force));
         self.unused += dt;
         let up = -estimate.attitude.transform_vector(&force).z - GRAVITY * dt;
+        if self.baro_at.is_some_and(|at| now.since(at).seconds() > NO_ALTITUDE) {
+            // The accelerometer alone drifts away.
+            self.altimeter.restart(-estimate.accel_bias.z);
+            self.baro_at = None;
+        }
         if stands {
             self.altimeter.stand(-estimate.accel_bias.z);
             return None;

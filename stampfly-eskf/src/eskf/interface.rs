@@ -22,12 +22,12 @@ impl Estimator for Eskf {
         }
         // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the
         // stack.
-        let (command, tallies) = (self.command, self.tallies);
+        let (command, findings, tallies) = (self.command, self.findings, self.tallies);
         *self = Self::new(self.config);
         self.now = at;
         self.initialized = true;
         self.calibration = *calibration;
-        self.command = command;
+        (self.command, self.findings) = (command, findings);
         self.tallies = tallies;
         self.state.gyro_bias = calibration.gyro_bias;
         self.state.attitude = attitude_from_specific_force(&calibration.specific_force);
@@ -111,7 +111,6 @@ impl Estimator for Eskf {
         }
         let motion = self.state.propagate(&imu.accel, &imu.gyro, math::smaller(dt, MAX_STEP));
         self.history.add(&motion);
-        self.rests = self.anchor.is_some() || self.rests && self.height() < self.config.ground_clearance + LIFTED;
         let [force, rate] = &mut self.vibration;
         force.add(&imu.accel, motion.dt);
         rate.add(&imu.gyro, motion.dt);

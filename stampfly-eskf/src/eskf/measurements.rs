@@ -129,7 +129,8 @@ impl Eskf {
             return Err(Refusal::Missing);
         }
         let end = delayed.age - 0.5 * flow.interval;
-        let raw = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate) + self.state.gyro_bias;
+        let turning = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate);
+        let raw = turning + self.state.gyro_bias;
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
@@ -156,7 +157,8 @@ impl Eskf {
             *tested = tested.wrapping_add(1);
         }
         if self.anchor.is_none() {
-            match self.fast_turn.step([raw.x, raw.y], flow.interval) {
+            // Of the vehicle itself: a zero that has moved turns nothing.
+            match self.fast_turn.step([turning.x, turning.y], flow.interval) {
                 Turn::Slow => {}
                 Turn::Fast => return Err(Refusal::Range),
                 Turn::Over(angle) => {

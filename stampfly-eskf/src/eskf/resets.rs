@@ -83,7 +83,7 @@ impl Eskf {
         self.state.position.z += down;
         self.state.gyro_bias += gyro_bias;
         self.state.accel_bias += accel_bias;
-        // Here the filter starts again.
+        // With this bias a restart begins.
         self.calibration.gyro_bias = self.state.gyro_bias;
         let square = |sigma: f32| if sigma.is_finite() { sigma * sigma } else { 0.0 };
         if correction.climb_sigma > 0.0 {
@@ -98,7 +98,7 @@ impl Eskf {
             self.covariance.inflate(ATTITUDE + axis, square(correction.tilt_sigma));
             self.covariance.inflate(GYRO_BIAS + axis, square(correction.gyro_bias_sigma));
             self.covariance.inflate(VELOCITY + axis, square(correction.velocity_sigma));
-            self.reset_accel_bias(axis);
+            self.covariance.reset(ACCEL_BIAS + axis, square(self.config.initial_accel_bias));
         }
         self.reset_history();
         self.status.resets = self.status.resets.wrapping_add(1);

@@ -16,7 +16,8 @@ use stampfly_types::messages::Finding;
 /// A course that neither explains counts against the camera after this time, s: within it, a shift
 /// of the gyro's zero that has just begun has made a course of its own.
 const UNCLEAR: f32 = 0.3;
-/// The same where a shift explains it, and others nearly as well: their courses part later.
+/// The same where a shift explains it, and others nearly as well: their courses part later. And where
+/// it is a second shift within seconds.
 const PERHAPS_GYRO: f32 = 0.8;
 
 /// See the head of this file.
@@ -35,11 +36,10 @@ impl Hypothesis for FlowDisagrees {
     const FINDING: Finding = Finding::Disagrees;
 
     fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
-        let Some(flow) = &seen.flow else { return Opinion::Unknown };
         if seen.stands {
             *self = Self::default();
-            return Opinion::Unknown;
         }
+        let Some(flow) = seen.flow.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
         if self.since_stood {
             return Opinion::Holds(None);
         }
@@ -57,10 +57,11 @@ impl Hypothesis for FlowDisagrees {
             };
         }
         match course.explanation(&seen.limits(config, seen.reckoners.older(), flow.distance)) {
-            Explanation::Gyro(_) | Explanation::Tilt => Opinion::Misfits,
+            Explanation::Tilt => Opinion::Misfits,
+            Explanation::Gyro(_) if !seen.shifted_lately || self.exceeds < PERHAPS_GYRO => Opinion::Misfits,
             Explanation::Unclear if self.exceeds < UNCLEAR => Opinion::Misfits,
             Explanation::PerhapsGyro if self.exceeds < PERHAPS_GYRO => Opinion::Misfits,
-            Explanation::Unclear | Explanation::PerhapsGyro | Explanation::Camera => {
+            Explanation::Unclear | Explanation::PerhapsGyro | Explanation::Gyro(_) | Explanation::Camera => {
                 self.since_stood = seen.reckoners.get(seen.reckoners.older()).stood;
                 Opinion::Holds(Some(seen.back_to_reckoned()))
             }

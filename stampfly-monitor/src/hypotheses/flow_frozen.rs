@@ -24,7 +24,7 @@ impl Hypothesis for FlowFrozen {
         self.reading = flow.counts;
         // On the ground nothing moves, and flow is not used.
         if self.repeats >= config.flow_repeats && !seen.stands {
-            Opinion::Holds(Some(seen.back_to_reckoned()))
+            Opinion::Holds(seen.back_to_comparable())
         } else {
             Opinion::Unknown
         }

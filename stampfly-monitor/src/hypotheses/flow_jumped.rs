@@ -53,10 +53,13 @@ impl Hypothesis for FlowJumped {
     const FINDING: Finding = Finding::Jumped;
 
     fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
-        let Some(flow) = &seen.flow else { return Opinion::Unknown };
+        if seen.stands {
+            *self = Self::default();
+        }
+        let Some(flow) = seen.flow.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
         let has_jumped = self.since > Some(WAITS);
-        if seen.stands || !flow.comparable || !seen.settled || flow.distance < config.flow_sharp_m {
-            *self = Self { since: self.since.filter(|_| has_jumped && !seen.stands), ..Self::default() };
+        if !flow.comparable || !seen.settled || flow.distance < config.flow_sharp_m {
+            *self = Self { since: self.since.filter(|_| has_jumped), ..Self::default() };
         } else {
             let limit = config.flow_jump_m_s + config.flow_jump_rad_s * flow.distance;
             let mut is_away = false;

@@ -31,7 +31,8 @@ impl Hypothesis for FlowStill {
             return Opinion::Unknown;
         }
         self.zeros = self.zeros.saturating_add(1);
-        for (turn, rate) in self.turn.iter_mut().zip(flow.turning) {
+        let bias = seen.estimate.gyro_bias;
+        for (turn, rate) in self.turn.iter_mut().zip([flow.turning[0] - bias.y, flow.turning[1] + bias.x]) {
             *turn += rate * flow.interval;
             self.turned = math::larger(self.turned, turn.abs());
         }
@@ -39,7 +40,7 @@ impl Hypothesis for FlowStill {
             return Opinion::Unknown;
         }
         if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
-            Opinion::Holds(Some(seen.back_to_reckoned()))
+            Opinion::Holds(seen.back_to_comparable())
         } else {
             // What stands still agrees with nothing.
             Opinion::Misfits

@@ -11,8 +11,10 @@ use crate::course::Explanation;
 use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::{EstimateCorrection, Finding};
-use stampfly_types::{Vec3, math};
+use stampfly_types::{Duration, Instant, Vec3, math};
 
+/// Two shifts are so far apart at least: two lives of a reckoner.
+const LATELY: Duration = Duration::from_secs(6);
 /// Share of a shift that the fit leaves uncertain.
 const UNCERTAIN: f32 = 0.1;
 
@@ -22,6 +24,16 @@ const UNCERTAIN: f32 = 0.1;
 pub struct GyroShifted {
     /// How long the residual has exceeded the gate, s.
     exceeds: f32,
+    /// When the last shift was found.
+    last: Option<Instant>,
+}
+
+impl GyroShifted {
+    /// Was a shift found so lately that another one is something else? A zero moves once; a floor that
+    /// moves to and fro makes one course after the other.
+    pub(crate) fn was_lately(&self, now: Instant) -> bool {
+        self.last.is_some_and(|last| now.since(last) < LATELY)
+    }
 }
 
 impl Hypothesis for GyroShifted {
@@ -44,6 +56,10 @@ impl Hypothesis for GyroShifted {
             return Opinion::Unknown;
         };
         self.exceeds = 0.0;
+        if seen.shifted_lately {
+            return Opinion::Unknown;
+        }
+        self.last = Some(seen.now);
         let reckoner = seen.reckoners.get(older);
         let [north, east] = shift.rate;
         // Since the last point the shift has turned it on.

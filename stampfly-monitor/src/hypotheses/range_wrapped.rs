@@ -81,6 +81,9 @@ impl Hypothesis for RangeWrapped {
             self.stand(altitude.change, altitude.dt);
         } else if seen.trusts_range {
             self.baro(altitude.change, seen.estimate.height - config.ground_clearance_m, altitude.dt);
+        } else {
+            // Found, or without a range to compare: until it stands again.
+            *self = Self { bias: self.bias, ..Self::default() };
         }
         match self.is_above().filter(|_| seen.trusts_range && !seen.stands) {
             Some((higher, climb)) => Opinion::Holds(Some(seen.climbs(higher, climb))),

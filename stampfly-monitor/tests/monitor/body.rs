@@ -110,6 +110,13 @@ impl Flight {
         (findings != SensorFindings::default()).then(|| (findings, (self.step - before) as f32 * DT))
     }
 
+    /// Flies for so many seconds, whatever is found.
+    pub fn fly_on(&mut self, seconds: f32, mut fault: impl FnMut(&mut Readings)) {
+        for n in 0..(seconds / DT) as u64 {
+            self.one(false, n as f32 * DT, &mut fault);
+        }
+    }
+
     fn fly(&mut self, seconds: f32, stands: bool, mut fault: impl FnMut(&mut Readings)) {
         for n in 0..(seconds / DT) as u64 {
             self.one(stands, n as f32 * DT, &mut fault);

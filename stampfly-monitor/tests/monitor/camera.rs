@@ -1,6 +1,7 @@
 //! Faults of the camera, and none.
 
 use crate::body::{Flight, Readings, VEHICLES};
+use stampfly_types::math;
 use stampfly_types::messages::{Finding, SensorFindings};
 
 /// What each vehicle finds when a fault begins after it has flown for so long, s.
@@ -62,4 +63,33 @@ fn an_offset_from_the_ground_on_is_found_as_the_vehicle_climbs() {
             assert!(after < 2.5, "{offset} rad/s, seed {seed}: {after} s");
         }
     }
+}
+
+/// Water below, or a field in the wind.
+#[test]
+fn of_a_floor_that_moves_to_and_fro_no_second_shift_of_the_gyro_is_made() {
+    for (speed, period) in [(0.8, 3.0), (1.2, 4.0), (1.5, 6.0)] {
+        for seed in 1..4 {
+            let mut flight = Flight::new(VEHICLES[0], seed);
+            assert_eq!(flight.until_found(3.0, |_| ()), None);
+            let began = flight.monitor.correction().number;
+            flight.fly_on(6.0, |readings| {
+                readings.picture[0] += speed / 0.6 * math::sin(readings.time * core::f32::consts::TAU / period);
+            });
+            let corrections = flight.monitor.correction().number - began;
+            assert!(corrections <= 2, "{speed} m/s in {period} s, seed {seed}: {corrections} corrections");
+        }
+    }
+}
+
+#[test]
+fn an_estimate_that_is_no_number_is_not_remembered() {
+    let mut flight = Flight::new(VEHICLES[0], 1);
+    assert_eq!(flight.until_found(3.0, |_| ()), None);
+    let estimate = flight.estimate;
+    flight.estimate.velocity.x = f32::NAN;
+    assert_eq!(flight.until_found(0.1, |_| ()), None);
+    flight.estimate = estimate;
+    flight.truth.velocity = estimate.velocity;
+    assert_eq!(flight.until_found(3.0, |_| ()), None);
 }

@@ -32,10 +32,23 @@ fn what_stays_at_a_value_is_stuck() {
 }
 
 #[test]
-fn a_door_convicts_no_range() {
+fn a_door_is_no_fault_of_the_range() {
     for rise in [1.5, -1.5] {
         for found in found(|readings| readings.altitude += rise * (readings.time / 0.8).min(1.0)) {
             assert_eq!(found, None, "{rise} m");
         }
     }
+}
+
+#[test]
+fn a_barometer_that_falls_silent_is_no_fault_of_the_range() {
+    for found in found(|readings| readings.altitude = f32::NAN) {
+        assert_eq!(found, None);
+    }
+    // Nor is a climb that nothing else measures.
+    let (mut flight, climbs) = (Flight::new(VEHICLES[0], 1), 0.3);
+    assert_eq!(flight.until_found(6.0, |_| ()), None);
+    flight.truth.velocity.z -= climbs;
+    flight.estimate.velocity.z -= climbs;
+    assert_eq!(flight.until_found(6.0, |readings| readings.altitude = f32::NAN), None);
 }
