@@ -13,6 +13,16 @@ const LAG: f32 = 0.02;
 /// Vertical drag, 1/s.
 const DRAG: f32 = 1.4;
 
+/// What the manager sees of a vehicle that feels its specific force and whose motors make what is asked for.
+fn flown<'a>(
+    estimate: &'a StateEstimate,
+    phase: FlightPhase,
+    setpoint: &'a Setpoint,
+    demand: &'a ControlOutput,
+) -> LandingInput<'a> {
+    LandingInput { felt: true, estimate, phase, setpoint, demand, unmet: 0.0 }
+}
+
 /// What the estimate says of a body at this height, m, and this climb rate, m/s.
 type Told = fn(height: f32, climb: f32, time: f32) -> StateEstimate;
 
@@ -75,14 +85,12 @@ impl Landing {
             estimate.specific_force = Vec3::new(0.0, 0.0, -force);
             let land_detected = manager.step(
                 Instant::from_micros(2_500 * k),
-                &LandingInput {
-                    felt: true,
-                    estimate: &estimate,
-                    phase: FlightPhase::Landing,
-                    setpoint: &Setpoint::default(),
-                    demand: &ControlOutput { thrust: demand, ..Default::default() },
-                    unmet: 0.0,
-                },
+                &flown(
+                    &estimate,
+                    FlightPhase::Landing,
+                    &Setpoint::default(),
+                    &ControlOutput { thrust: demand, ..Default::default() },
+                ),
             );
             if land_detected.landed {
                 return Some(Ended { after: time, height, touch: touch.unwrap_or(0.0) });
@@ -182,14 +190,8 @@ fn hovering_low_in_flight_is_never_landed() {
         ..Default::default()
     };
     for k in 0..8_000 {
-        let input = LandingInput {
-            felt: true,
-            estimate: &estimate,
-            phase: FlightPhase::Flying,
-            setpoint: &Setpoint::default(),
-            demand: &ControlOutput { thrust: 1.0, ..Default::default() },
-            unmet: 0.0,
-        };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
+        let input = flown(&estimate, FlightPhase::Flying, &setpoint, &demand);
         assert!(!manager.step(Instant::from_micros(2_500 * k), &input).landed);
     }
 }
@@ -200,14 +202,8 @@ fn a_vehicle_that_is_held_never_completes_its_take_off() {
     let mut manager = TakeoffLanding::new(LandingConfig::default());
     let held = everything(0.0, 0.0, 0.0);
     for k in 0..8_000 {
-        let input = LandingInput {
-            felt: true,
-            estimate: &held,
-            phase: FlightPhase::TakeOff,
-            setpoint: &Setpoint::default(),
-            demand: &ControlOutput { thrust: 1.5, ..Default::default() },
-            unmet: 0.0,
-        };
+        let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.5, ..Default::default() });
+        let input = flown(&held, FlightPhase::TakeOff, &setpoint, &demand);
         let land_detected = manager.step(Instant::from_micros(2_500 * k), &input);
         assert!(!land_detected.takeoff_complete && land_detected.contact == GroundContact::Ground);
     }
@@ -225,8 +221,7 @@ fn stages(manager: &mut TakeoffLanding, steps: &[(FlightPhase, f32, f32)], valid
             ..Default::default()
         };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
-        let input =
-            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input = flown(&estimate, phase, &setpoint, &demand);
         manager.step(Instant::from_micros(2_500 * k as u64), &input);
         told.push(manager.stage().to_string());
     }
@@ -264,8 +259,7 @@ fn a_take_off_counts_from_its_phase_and_not_from_arming() {
     let mut step = |seconds, phase, height| {
         let estimate = StateEstimate { height, valid: Validity::ALL, ..Default::default() };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput::default());
-        let input =
-            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input = flown(&estimate, phase, &setpoint, &demand);
         manager.step(Instant::from_secs(seconds), &input)
     };
     assert_eq!(step(0, FlightPhase::Armed, 0.0).thrust_ceiling, f32::MAX);
@@ -314,14 +308,7 @@ fn a_vehicle_that_sinks_fast_under_a_ceiling_gets_its_thrust_back() {
             };
             let setpoint = Setpoint::default();
             let phase = if k < 200 { FlightPhase::Flying } else { FlightPhase::Landing };
-            let input = LandingInput {
-                felt: true,
-                estimate: &estimate,
-                phase,
-                setpoint: &setpoint,
-                demand: &demand,
-                unmet: 0.0,
-            };
+            let input = flown(&estimate, phase, &setpoint, &demand);
             ceiling = manager.step(now, &input).thrust_ceiling;
             if sink_rate > config.descent + 0.1 {
                 fast.get_or_insert(now);
@@ -360,14 +347,7 @@ fn lands(manager: &mut TakeoffLanding, steps: u64, height: Option<f32>, sink_rat
         ..Default::default()
     };
     let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
-    let input = LandingInput {
-        felt: true,
-        estimate: &estimate,
-        phase: FlightPhase::Landing,
-        setpoint: &setpoint,
-        demand: &demand,
-        unmet: 0.0,
-    };
+    let input = flown(&estimate, FlightPhase::Landing, &setpoint, &demand);
     (0..steps).map(|k| manager.step(Instant::from_micros(2_500 * k), &input)).last().unwrap_or_default()
 }
 
@@ -465,14 +445,7 @@ fn complete(away: f32, path: f32, speed: f32) -> Option<f32> {
         let setpoint =
             Setpoint { position: Vec3::new(0.0, 0.0, -0.5), velocity: Vec3::new(0.0, 0.0, path), ..Default::default() };
         let demand = ControlOutput { thrust: 1.0, ..Default::default() };
-        let input = LandingInput {
-            felt: true,
-            estimate: &estimate,
-            phase: FlightPhase::TakeOff,
-            setpoint: &setpoint,
-            demand: &demand,
-            unmet: 0.0,
-        };
+        let input = flown(&estimate, FlightPhase::TakeOff, &setpoint, &demand);
         manager.step(Instant::from_micros(2_500 * k), &input)
     };
     assert!(!step(0, 0.03, 0.0).takeoff_complete);
@@ -512,8 +485,7 @@ fn contact(share: f32, hover_thrust: f32, sensors: SensorMask, millis: u64) -> G
         let phase = if now == 0 { FlightPhase::Armed } else { FlightPhase::TakeOff };
         let thrust = if now == 0 { 0.0 } else { share * 0.36 };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
-        let input =
-            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input = flown(&estimate, phase, &setpoint, &demand);
         contact = manager.step(Instant::from_millis(now), &input).contact;
     }
     contact
@@ -545,8 +517,7 @@ fn lands_in_a_hand(hover_thrust: f32, thrust: f32, force: f32, sink_rate: Option
     (0u64..1_600).any(|step| {
         let phase = if step < 800 { FlightPhase::Flying } else { FlightPhase::Landing };
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust, ..Default::default() });
-        let input =
-            LandingInput { felt: true, estimate: &estimate, phase, setpoint: &setpoint, demand: &demand, unmet: 0.0 };
+        let input = flown(&estimate, phase, &setpoint, &demand);
         manager.step(Instant::from_micros(2_500 * step), &input).landed
     })
 }
@@ -621,14 +592,7 @@ fn a_touch_that_is_felt_ends_the_ramp() {
             };
             let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
             let setpoint = Setpoint::default();
-            let input = LandingInput {
-                felt: true,
-                estimate: &estimate,
-                phase,
-                setpoint: &setpoint,
-                demand: &demand,
-                unmet: 0.0,
-            };
+            let input = flown(&estimate, phase, &setpoint, &demand);
             ceiling = manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling;
             ceiling
         };
@@ -648,14 +612,7 @@ fn a_blind_landing_gives_up_more_thrust_when_it_breaks_off_a_take_off() {
         let estimate = nothing(0.0, 0.0, 0.0);
         let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: 1.0, ..Default::default() });
         let mut step = |k: u64, phase| {
-            let input = LandingInput {
-                felt: true,
-                estimate: &estimate,
-                phase,
-                setpoint: &setpoint,
-                demand: &demand,
-                unmet: 0.0,
-            };
+            let input = flown(&estimate, phase, &setpoint, &demand);
             manager.step(Instant::from_micros(2_500 * k), &input).thrust_ceiling
         };
         step(0, phase);
@@ -680,14 +637,7 @@ fn what_something_carries_has_landed_whatever_the_estimate_says() {
             };
             let (setpoint, demand) = (Setpoint::default(), ControlOutput { thrust: share, ..Default::default() });
             let phase = if k < 400 { FlightPhase::Flying } else { FlightPhase::Landing };
-            let input = LandingInput {
-                felt: true,
-                estimate: &estimate,
-                phase,
-                setpoint: &setpoint,
-                demand: &demand,
-                unmet: 0.0,
-            };
+            let input = flown(&estimate, phase, &setpoint, &demand);
             manager.step(Instant::from_micros(2_500 * k), &input).landed
         })
     };
