@@ -61,7 +61,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
 
     "eskf.process.gyro_noise" [1e-5, 0.03] "rad/s/sqrt(Hz)" eskf.gyro_noise => "gyro noise density";
     "eskf.process.accel_noise" [1e-4, 10.0] "m/s^2/sqrt(Hz)" eskf.accel_noise => "accelerometer noise density";
-    "eskf.process.gyro_bias_walk" [0.0, 0.03] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
+    "eskf.process.gyro_bias_walk" [0.0, 0.1] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
     "eskf.process.accel_bias_walk" [0.0, 0.3] "m/s^2/sqrt(s)" eskf.accel_bias_walk => "accelerometer bias random walk";
     "eskf.obs.tof_noise" [1e-3, 0.3] "m" eskf.tof_sigma => "range noise";
     "eskf.obs.flow_noise" [1e-3, 3.0] "rad/s" eskf.flow_sigma => "flow noise";
@@ -137,8 +137,8 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
     "takeoff.ceiling.rise" [0.0, 10.0] "1/s" landing.takeoff_ceiling_rise => "it rises so fast";
     "takeoff.arrived.band" [0.02, 0.3] "m" landing.takeoff_band => "take-off has arrived this close to its goal";
     "takeoff.arrived.speed" [0.05, 0.5] "m/s" landing.takeoff_speed => "take-off has arrived slower than this";
-    "takeoff.arrived.time" [0.1, 2.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";
-    "takeoff.limit.time" [2.0, 60.0] "s" landing.takeoff_limit => "take-off is complete after this long in any case";
+    "takeoff.arrived.time" [0.1, 5.0] "s" landing.takeoff_settle => "arrived for this long, take-off is complete";
+    "takeoff.limit.time" [2.0, 14.0] "s" landing.takeoff_limit => "take-off is complete after this long in any case";
 
     "navigator.takeoff.height" [0.2, 3.0] "m" navigator.take_off_height => "take-off height when a command names none";
     "navigator.takeoff.speed" [0.1, 2.0] "m/s" navigator.take_off_speed => "take-off speed when a command names none";
