@@ -55,7 +55,7 @@ stampfly_bus::topics! {
     estimator_command: EstimatorCommand = latest @ on event from mode => [estimation, monitor];
     /// Which sensor measures, and what is wrong with one that does not.
     findings: SensorFindings = latest @ on event from monitor => [estimation, failsafe];
-    /// What the estimate is to be put right by.
+    /// A correction of the estimate, after a sensor misled it.
     estimate_correction: EstimateCorrection = latest @ on event from monitor => [estimation];
 
     // Decisions.

@@ -493,6 +493,15 @@ impl Eskf {
         self.anchor.is_some() || flow || self.is_aided_outside(Sensor::Level)
     }
 
+    /// Says in the status how uncertain motion and gyro are.
+    fn publish_sigmas(&mut self) {
+        self.status.acceleration_sigma = self.acceleration_sigma();
+        self.status.velocity_sigma = self.larger_sigma(VELOCITY);
+        self.status.gyro_bias_sigma = self.larger_sigma(GYRO_BIAS);
+        let yaw = self.covariance.get(GYRO_BIAS + 2, GYRO_BIAS + 2);
+        self.status.yaw_bias_sigma = math::sqrt(math::larger(yaw, 0.0));
+    }
+
     /// Standard deviation of the acceleration along body x and y of a vehicle that its thrust carries,
     /// m/s²: a turn about y or x takes gravity there, and an accelerometer's bias is one.
     fn acceleration_sigma(&self) -> f32 {

@@ -32,8 +32,8 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, Instant};
 
-/// Alerts with which a vehicle does not feel the ground under its legs.
-const NUMB: Alerts = Alerts::FORCE_IMPLAUSIBLE.with(Alerts::ACCEL_FAULTY);
+/// Alerts with which the accelerometer shows neither motion nor the ground under the legs.
+pub const UNFELT: Alerts = Alerts::FORCE_IMPLAUSIBLE.with(Alerts::ACCEL_FAULTY);
 /// Cosine of the largest tilt, 15°, before and after turning over.
 const LEVEL: f32 = 0.966;
 
@@ -253,7 +253,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
                 let low = state.is_low(config, facts) && (asked.disarm || pilot.switch.falls);
                 // What carries it cannot be felt.
                 let stands = facts.known_height().is_some_and(|height| height < config.standing_height);
-                let numb = stands && facts.alerts.intersects(NUMB);
+                let numb = stands && facts.alerts.intersects(UNFELT);
                 low || numb || (pilot.switch.falls && state.landing_by_switch) || waited(state.landing_limit)
             }
             FlightPhase::Init | FlightPhase::IdleGround | FlightPhase::IdleHeld | FlightPhase::Flip => false,

@@ -43,6 +43,8 @@ pub struct FlowReading {
     pub apart: [[f32; 2]; 2],
     /// See [`apart`](Self::apart).
     pub smooth: [[f32; 2]; 2],
+    /// Ages of the reckoners that it was compared with, s: one may have begun anew since.
+    pub ages: [f32; 2],
     /// Square of what readings may be wrong by, as far as it is still in the smoothed difference,
     /// (m/s)².
     pub uncertain: f32,
@@ -228,12 +230,15 @@ impl Recollection {
             rate.add(sample.at, &sample.data.gyro);
         }
         let [shaken, _] = self.shaken();
-        let square = |value: f32| value * value;
-        let zero = square(config.accel_sigma_m_s2) + square(config.vibration_share) * shaken;
-        let sigmas = Sigmas {
-            velocity: status.velocity_sigma,
-            acceleration: math::sqrt(zero + square(status.acceleration_sigma)),
-            gyro_bias: status.gyro_bias_sigma,
+        let sigmas = || {
+            let square = |value: f32| value * value;
+            let zero = square(config.accel_sigma_m_s2) + square(config.vibration_share) * shaken;
+            Sigmas {
+                velocity: status.velocity_sigma,
+                acceleration: math::sqrt(zero + square(status.acceleration_sigma)),
+                gyro_bias: status.gyro_bias_sigma,
+                yaw_bias: status.yaw_bias_sigma,
+            }
         };
         match self.reckoners.step(samples, estimate, sigmas, stands) {
             Restart::Neither => {}
@@ -305,6 +310,7 @@ impl Recollection {
 
         let share = interval / (config.flow_smooth_s + interval);
         let (mut apart, mut ratio) = ([[0.0; 2]; 2], 0.0);
+        let ages = [0, 1].map(|index| self.reckoners.get(index).age);
         for (index, ((apart, smooth), course)) in
             apart.iter_mut().zip(&mut self.smooth).zip(&mut self.courses).enumerate()
         {
@@ -331,6 +337,7 @@ impl Recollection {
             turning,
             rate: [x / distance, y / distance],
             apart,
+            ages,
             smooth: self.smooth,
             uncertain: self.uncertain,
             ratio,

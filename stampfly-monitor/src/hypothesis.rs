@@ -24,8 +24,7 @@ pub enum Opinion {
     Fits,
     /// It fits badly, which is not enough to say that it is wrong.
     Misfits,
-    /// The hypothesis holds. By so much the estimate is wrong, if it was misled; the number of the
-    /// correction is the monitor's.
+    /// The hypothesis holds, with what puts the estimate right if the sensor has misled it.
     Holds(Option<EstimateCorrection>),
 }
 

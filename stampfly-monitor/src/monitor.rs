@@ -102,7 +102,6 @@ pub struct Monitor {
     findings: SensorFindings,
     /// How long flow and range, left out, have fitted what they should measure, s.
     fits: [f32; 2],
-    correction: EstimateCorrection,
     /// How long it has to hold back, s.
     waits: f32,
     last: Option<Instant>,
@@ -126,17 +125,11 @@ impl Monitor {
         &self.findings
     }
 
-    /// What the estimate was put right by last.
-    #[must_use]
-    pub fn correction(&self) -> &EstimateCorrection {
-        &self.correction
-    }
-
-    /// Takes a step.
-    pub fn step(&mut self, now: Instant, input: &MonitorInput<'_>) {
+    /// Takes a step. Gives what the estimate is to be put right by, where a sensor has misled it.
+    pub fn step(&mut self, now: Instant, input: &MonitorInput<'_>) -> Option<EstimateCorrection> {
         self.hold_back(now, input);
         if !input.estimate.sensors.contains(SensorMask::IMU) || !is_finite(input.estimate, input.status) {
-            return;
+            return None;
         }
         let (bridge, trusted) = (self.bridge(input.imu), self.trusted());
         let bridged = bridge.as_slice();
@@ -194,9 +187,10 @@ impl Monitor {
             self.begin_without_range(now);
         }
         self.clear(input, fits, elapsed);
-        if let Some(correction) = correction {
+        if let Some(correction) = &correction {
             self.correct(correction, estimate);
         }
+        correction
     }
 
     /// Counts how long the estimate has to find itself, and begins anew where it does.
@@ -269,9 +263,8 @@ impl Monitor {
         }
     }
 
-    /// Publishes a correction, and goes on from the estimate that it makes.
-    fn correct(&mut self, correction: EstimateCorrection, estimate: &StateEstimate) {
-        self.correction = EstimateCorrection { number: self.correction.number.wrapping_add(1), ..correction };
+    /// Goes on from the estimate that a correction makes.
+    fn correct(&mut self, correction: &EstimateCorrection, estimate: &StateEstimate) {
         let corrected = StateEstimate {
             attitude: (stampfly_types::Quat::from_scaled_axis(correction.turn) * estimate.attitude).normalize(),
             velocity: estimate.velocity + correction.velocity,
@@ -290,6 +283,7 @@ impl Monitor {
             velocity: correction.velocity_sigma,
             acceleration: GRAVITY * correction.tilt_sigma + self.config.accel_sigma_m_s2,
             gyro_bias: correction.gyro_bias_sigma,
+            ..Sigmas::default()
         };
         self.recollection.begin(&corrected, sigmas);
     }
@@ -306,7 +300,6 @@ fn is_finite(estimate: &StateEstimate, status: &EstimatorStatus) -> bool {
 /// Two corrections of one step: camera and gyro put right what is horizontal, ranges what is vertical.
 fn both(first: &EstimateCorrection, second: &EstimateCorrection) -> EstimateCorrection {
     EstimateCorrection {
-        number: 0,
         turn: first.turn + second.turn,
         velocity: first.velocity + second.velocity,
         down: first.down + second.down,

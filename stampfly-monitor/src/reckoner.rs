@@ -29,6 +29,8 @@ pub struct Sigmas {
     pub acceleration: f32,
     /// Bias of the gyro about roll and pitch, rad/s.
     pub gyro_bias: f32,
+    /// Bias about yaw, rad/s.
+    pub yaw_bias: f32,
 }
 
 /// Attitude and velocity, reckoned from an estimate on.
@@ -100,6 +102,20 @@ impl Reckoner {
         GRAVITY * self.sigmas.gyro_bias * self.age
     }
 
+    /// Variance of the horizontal acceleration that tilt and accelerometer had from the beginning, (m/s²)².
+    #[must_use]
+    pub fn tilted(&self) -> f32 {
+        self.sigmas.acceleration * self.sigmas.acceleration
+    }
+
+    /// Variance of the velocity that the heading has turned aside by now, (m/s)²: the gyro's zero about
+    /// yaw turns what has been gained since the beginning.
+    #[must_use]
+    pub fn aside(&self) -> f32 {
+        let turned = self.sigmas.yaw_bias * self.age;
+        turned * turned * (self.velocity - self.began).horizontal().norm_squared()
+    }
+
     /// Variance of the difference between a sound camera's velocity and this one, along both axes
     /// together, (m/s)², but for what single readings are wrong by.
     #[must_use]
@@ -109,8 +125,9 @@ impl Reckoner {
         let turned = square(GRAVITY * config.gyro_scale) * self.swept.norm_squared();
         let drift = 0.5 * self.drift();
         square(math::larger(config.velocity_sigma_m_s, self.sigmas.velocity))
-            + (square(self.sigmas.acceleration) + turned + square(drift)) * square(self.age)
+            + (self.tilted() + turned + square(drift)) * square(self.age)
             + self.walk
+            + self.aside()
             + square(config.flow_scale / config.gate_sigmas) * gained
     }
 }
@@ -198,7 +215,7 @@ impl Reckoners {
         &mut self,
         samples: &[Stamped<ImuData>],
         estimate: &StateEstimate,
-        sigmas: Sigmas,
+        sigmas: impl Fn() -> Sigmas,
         stands: bool,
     ) -> Restart {
         let mut gap = false;
@@ -216,7 +233,7 @@ impl Reckoners {
         }
         if gap {
             // What the vehicle did meanwhile is not known.
-            self.begin(estimate, sigmas, stands);
+            self.begin(estimate, sigmas(), stands);
             return Restart::Both;
         }
         if self.elapsed < BLOCK {
@@ -229,7 +246,7 @@ impl Reckoners {
         let change = force - core::mem::replace(&mut self.before, force);
         let noise = change.x * change.x + change.y * change.y;
         if stands || !self.has_begun {
-            self.begin(estimate, sigmas, stands);
+            self.begin(estimate, sigmas(), stands);
             return Restart::Both;
         }
         for (reckoner, apart) in self.pair.iter_mut().zip(&mut self.apart) {
@@ -240,7 +257,7 @@ impl Reckoners {
         if self.get(younger).age < HALF {
             return Restart::Neither;
         }
-        let fresh = Reckoner::new(estimate, sigmas);
+        let fresh = Reckoner::new(estimate, sigmas());
         let older = core::mem::replace(&mut self.older, younger);
         if let (Some(reckoner), Some(apart)) = (self.pair.get_mut(older), self.apart.get_mut(older)) {
             (*reckoner, *apart) = (fresh, Vec3::zeros());
@@ -255,7 +272,7 @@ mod tests {
     use stampfly_types::frame;
 
     const DT: f32 = 0.0025;
-    const SIGMAS: Sigmas = Sigmas { velocity: 0.03, acceleration: 0.1, gyro_bias: 0.002 };
+    const SIGMAS: Sigmas = Sigmas { velocity: 0.03, acceleration: 0.1, gyro_bias: 0.002, yaw_bias: 0.002 };
 
     /// Steps through these seconds of samples that a function of time gives, with an estimate that is
     /// another one. How often did one begin anew?
@@ -269,7 +286,7 @@ mod tests {
         for n in 1..=(seconds / DT) as u64 {
             let time = n as f32 * DT;
             let imu = Stamped { at: Instant::from_micros(n * 2_500), generation: 1, data: sample(time) };
-            let restart = reckoners.step(&[imu], &estimate(time), SIGMAS, false);
+            let restart = reckoners.step(&[imu], &estimate(time), || SIGMAS, false);
             restarts += u32::from(matches!(restart, Restart::One(_)));
         }
         restarts

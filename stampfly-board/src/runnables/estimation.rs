@@ -17,8 +17,6 @@ pub struct Estimation {
     /// Has the still-calibration been used?
     started: bool,
     pacer: Pacer,
-    /// Number of the last correction.
-    corrections: u32,
 }
 
 impl Estimation {
@@ -34,7 +32,6 @@ impl Estimation {
             complementary: Complementary::new(config.complementary),
             started: false,
             pacer: Pacer::default(),
-            corrections: 0,
         }
     }
 
@@ -50,7 +47,7 @@ impl Runnable for Estimation {
     type Ends<'b> = EstimationEnds<'b>;
 
     fn run(&mut self, activation: &mut Activation, ends: &mut EstimationEnds<'_>) {
-        let feeding = (&mut self.started, &mut self.pacer, &mut self.corrections);
+        let feeding = (&mut self.started, &mut self.pacer);
         match self.kind {
             EstimatorKind::Eskf => step(&mut self.eskf, feeding, activation.now(), ends),
             EstimatorKind::Complementary => step(&mut self.complementary, feeding, activation.now(), ends),
@@ -62,7 +59,7 @@ impl Runnable for Estimation {
 #[inline(never)]
 fn step(
     estimator: &mut impl Estimator,
-    (started, pacer, corrections): (&mut bool, &mut Pacer, &mut u32),
+    (started, pacer): (&mut bool, &mut Pacer),
     now: Instant,
     ends: &mut EstimationEnds<'_>,
 ) {
@@ -74,14 +71,12 @@ fn step(
     if ends.estimator_command.sample().is_some() {
         estimator.command(now, ends.estimator_command.get());
     }
+    // As long as they hold: the estimator may have begun again since.
     if ends.findings.sample().is_some() {
         estimator.heed(now, ends.findings.get());
     }
-    if let Some(correction) = ends.estimate_correction.sample()
-        && *corrections != correction.data.number
-    {
-        *corrections = correction.data.number;
-        estimator.correct(now, &correction.data);
+    if ends.estimate_correction.is_new() {
+        estimator.correct(now, ends.estimate_correction.get());
     }
     let measurements = Measurements {
         imu: &ends.sensor_imu,

@@ -3,28 +3,20 @@
 use crate::config::VehicleConfig;
 use crate::topics::MonitorEnds;
 use stampfly_bus::{Activation, Runnable};
+use stampfly_mode::decision::UNFELT;
 use stampfly_monitor::MonitorInput;
-use stampfly_types::messages::{Alerts, SensorFindings};
-
-/// With these the accelerometer says nothing about the motion.
-const NOT_FELT: Alerts = Alerts::ACCEL_FAULTY.with(Alerts::FORCE_IMPLAUSIBLE);
 
 /// Monitor: samples and what the estimator made of them in, the state of every sensor out.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "key-frame", derive(serde::Serialize, serde::Deserialize))]
-pub struct Monitor {
-    monitor: stampfly_monitor::Monitor,
-    published: SensorFindings,
-    corrections: u32,
-}
+pub struct Monitor(stampfly_monitor::Monitor);
 
 impl Monitor {
     /// Nothing seen yet.
     #[inline(never)]
     #[must_use]
     pub fn new(config: &VehicleConfig) -> Self {
-        let monitor = stampfly_monitor::Monitor::new(config.monitor);
-        Self { monitor, published: SensorFindings::default(), corrections: 0 }
+        Self(stampfly_monitor::Monitor::new(config.monitor))
     }
 }
 
@@ -34,7 +26,9 @@ impl Runnable for Monitor {
     fn run(&mut self, activation: &mut Activation, ends: &mut MonitorEnds<'_>) {
         let now = activation.now();
         let command = ends.estimator_command.get();
-        self.monitor.step(
+        let Self(monitor) = self;
+        let before = *monitor.findings();
+        let correction = monitor.step(
             now,
             &MonitorInput {
                 imu: &ends.sensor_imu,
@@ -45,18 +39,14 @@ impl Runnable for Monitor {
                 status: ends.estimate_status.get(),
                 stands: command.on_ground,
                 flies: command.flying,
-                felt: !ends.system_alert.get().active.intersects(NOT_FELT),
+                felt: !ends.system_alert.get().active.intersects(UNFELT),
                 restarts: command.full_resets,
             },
         );
-        let findings = self.monitor.findings();
-        if *findings != self.published {
-            self.published = *findings;
-            ends.findings.publish(now, findings);
+        if *monitor.findings() != before {
+            ends.findings.publish(now, monitor.findings());
         }
-        let correction = self.monitor.correction();
-        if correction.number != self.corrections {
-            self.corrections = correction.number;
+        if let Some(correction) = &correction {
             ends.estimate_correction.publish(now, correction);
         }
     }

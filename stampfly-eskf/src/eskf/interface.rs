@@ -127,6 +127,7 @@ impl Estimator for Eskf {
             };
             self.covariance.propagate(&self.pending_rotation, &self.pending_step, &noise);
             self.limit_attitude();
+            self.publish_sigmas();
             self.pending_step = PropagationStep::default();
             self.pending_rotation = self.state.rotation();
         }
@@ -259,12 +260,7 @@ impl Estimator for Eskf {
     }
 
     fn status(&self) -> EstimatorStatus {
-        EstimatorStatus {
-            acceleration_sigma: self.acceleration_sigma(),
-            velocity_sigma: self.larger_sigma(VELOCITY),
-            gyro_bias_sigma: self.larger_sigma(GYRO_BIAS),
-            ..self.status
-        }
+        self.status
     }
 
     fn heed(&mut self, _at: Instant, findings: &SensorFindings) {

@@ -77,8 +77,6 @@ pub struct Shadow {
     command: Recent<EstimatorCommand>,
     findings: Recent<SensorFindings>,
     correction: Recent<EstimateCorrection>,
-    /// Number of the last correction.
-    corrections: u32,
     /// What the mode machine asked for last.
     asked: Option<EstimatorCommand>,
     last_imu: Option<(Instant, ImuData)>,
@@ -103,7 +101,6 @@ impl Shadow {
             command: Recent::default(),
             findings: Recent::default(),
             correction: Recent::default(),
-            corrections: 0,
             asked: None,
             last_imu: None,
         }
@@ -174,10 +171,7 @@ impl Shadow {
         if let Some(findings) = self.findings.taken(findings).last() {
             estimator.heed(now, &findings.data);
         }
-        if let Some(correction) = self.correction.taken(correction).last()
-            && self.corrections != correction.data.number
-        {
-            self.corrections = correction.data.number;
+        if let Some(correction) = self.correction.taken(correction).last() {
             estimator.correct(now, &correction.data);
         }
         let (imu, tof, flow) = (self.imu.taken(imu), self.tof.taken(tof), self.flow.taken(flow));

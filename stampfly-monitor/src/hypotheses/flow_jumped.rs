@@ -61,13 +61,15 @@ impl Hypothesis for FlowJumped {
         if !flow.comparable || !seen.settled || flow.distance < config.flow_sharp_m {
             *self = Self { since: self.since.filter(|_| has_jumped), ..Self::default() };
         } else {
+            let square = |value: f32| value * value;
             let limit = config.flow_jump_m_s + config.flow_jump_rad_s * flow.distance;
             let mut is_away = false;
             for (index, means) in self.against.iter_mut().enumerate() {
                 let reckoner = seen.reckoners.get(index);
-                let drifts = config.gate_sigmas * reckoner.drift() * SPAN;
-                let walked = config.gate_sigmas * config.gate_sigmas * means.walked(reckoner);
-                means.step(reckoner.age, index, flow, flow.uncertain + walked + drifts * drifts, limit);
+                // As the filter has its tilt, and as the gyro's zero has moved it since.
+                let tilted = (reckoner.tilted() + square(reckoner.drift())) * square(SPAN);
+                let noise = square(config.gate_sigmas) * (means.walked(reckoner) + reckoner.aside() + tilted);
+                means.step(index, flow, flow.uncertain + noise, limit);
                 is_away |= means.from.is_some();
             }
             if !has_jumped {
@@ -87,12 +89,13 @@ impl Means {
         if self.readings.is_multiple_of(BLOCK) {
             self.walk = [self.walk[1], self.walk[2], reckoner.walk];
         }
-        reckoner.walk - self.walk[0]
+        math::larger(reckoner.walk - self.walk[0], 0.0)
     }
 
     /// Takes a reading. A mean that is away from an earlier one by more than `limit`, m/s, beyond what is
     /// uncertain, (m/s)², has jumped from there, until one is not.
-    fn step(&mut self, age: f32, index: usize, flow: &FlowReading, uncertain: f32, limit: f32) {
+    fn step(&mut self, index: usize, flow: &FlowReading, uncertain: f32, limit: f32) {
+        let age = flow.ages.get(index).copied().unwrap_or_default();
         if age < core::mem::replace(&mut self.age, age) {
             *self = Self { age, ..Self::default() };
         }

@@ -62,7 +62,9 @@ pub struct Flight {
     counted: [f32; 2],
     turned: [f32; 2],
     vehicle: Vehicle,
-    corrections: u32,
+    /// The last correction, and how many there were.
+    pub correction: EstimateCorrection,
+    pub corrections: u32,
 }
 
 /// Where the body is.
@@ -95,6 +97,7 @@ impl Flight {
             counted: [0.0; 2],
             turned: [0.0; 2],
             vehicle,
+            correction: EstimateCorrection::default(),
             corrections: 0,
         };
         flight.fly(STOOD, true, |_| ());
@@ -174,10 +177,9 @@ impl Flight {
             felt: true,
             restarts: 0,
         };
-        self.monitor.step(now, &input);
-        let correction = *self.monitor.correction();
-        if correction.number != self.corrections {
-            self.corrections = correction.number;
+        if let Some(correction) = self.monitor.step(now, &input) {
+            self.corrections += 1;
+            self.correction = correction;
             let estimate = &mut self.estimate;
             estimate.attitude = (Quat::from_scaled_axis(correction.turn) * estimate.attitude).normalize();
             estimate.velocity += correction.velocity;

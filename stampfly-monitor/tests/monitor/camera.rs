@@ -72,11 +72,11 @@ fn of_a_floor_that_moves_to_and_fro_no_second_shift_of_the_gyro_is_made() {
         for seed in 1..4 {
             let mut flight = Flight::new(VEHICLES[0], seed);
             assert_eq!(flight.until_found(3.0, |_| ()), None);
-            let began = flight.monitor.correction().number;
+            let began = flight.corrections;
             flight.fly_on(6.0, |readings| {
                 readings.picture[0] += speed / 0.6 * math::sin(readings.time * core::f32::consts::TAU / period);
             });
-            let corrections = flight.monitor.correction().number - began;
+            let corrections = flight.corrections - began;
             assert!(corrections <= 2, "{speed} m/s in {period} s, seed {seed}: {corrections} corrections");
         }
     }

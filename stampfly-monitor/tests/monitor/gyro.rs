@@ -15,7 +15,7 @@ fn a_jump_is_found_before_the_vehicle_has_turned_far() {
                 let (findings, after) = found.expect(&case);
                 assert_eq!((findings.gyro.finding, findings.flow.finding), (Finding::Shifted, Finding::None), "{case}");
                 assert!(after < 0.2, "{case}");
-                let off = flight.monitor.correction().gyro_bias.x - jump;
+                let off = flight.correction.gyro_bias.x - jump;
                 assert!(off.abs() < 0.25 * jump.abs(), "{case}, {off}");
             }
         }

@@ -115,6 +115,8 @@ message! {
         velocity_sigma: f32 ["m/s"],
         /// One standard deviation of the gyro's bias about roll and pitch, the larger of both.
         gyro_bias_sigma: f32 ["rad/s"],
+        /// The same about yaw.
+        yaw_bias_sigma: f32 ["rad/s"],
         /// Is the estimate lost?
         diverged: bool,
     }

@@ -60,8 +60,6 @@ message! {
     /// By how much an estimate is wrong, because a sensor misled it: what to add, and how uncertain
     /// the sum is.
     pub struct EstimateCorrection {
-        /// A change of this number asks for it.
-        number: u32,
         /// Turn of the attitude, about world axes.
         turn: Vec3 ["rad"],
         /// World NED.
