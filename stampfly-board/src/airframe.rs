@@ -36,9 +36,9 @@ pub const GROUND_HEIGHT: f64 = 0.03;
 /// Distance of each foot from the body's x and y axis, m.
 pub const FOOT_OFFSET: f64 = 0.030;
 
-/// For so long it flies on its last rates. A disturbance of four fifths of its authority, which
-/// nothing meets meanwhile and the rest then brakes, turns it by 262 rad/s²·(50 ms)²/2·5: a quarter
-/// of a turn, from which it levels.
+/// Longest time without inertial data from which it recovers. A disturbance of four fifths of its
+/// torque, 262 rad/s², turns it for 50 ms without an answer, and the last fifth then brakes it: by
+/// 262·0.05²/2·5 rad altogether, a quarter of a turn, from which it levels.
 pub const LAST_RATES: Duration = Duration::from_millis(50);
 /// Motors that get no duties for this long are stopped: what the flight task may be late by, and two
 /// of the controller's deadlines of 5 ms.

@@ -67,7 +67,7 @@ pub struct VehicleConfig {
     pub navigator: NavigatorConfig,
     /// Mode machine and arming.
     pub mode: ModeConfig,
-    /// Who judges the sensors.
+    /// Monitor of the sensors.
     pub monitor: MonitorConfig,
     /// Detectors of what can go wrong.
     pub failsafe: FailsafeConfig,

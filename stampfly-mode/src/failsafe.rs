@@ -240,7 +240,7 @@ impl Failsafe {
             faulty |= unexplained && stands && felt;
             implausible = unexplained && !stands && felt;
         }
-        let found = struck::judged(found, input, &self.motion.force());
+        let found = struck::from_above(found, input, &self.motion.force());
         found
             .set(Alerts::IMU_FAULTY, faulty)
             .set(Alerts::ACCEL_FAULTY, accel_faulty && !faulty)

@@ -5,9 +5,9 @@
 
 use stampfly_types::math;
 
-/// A turn that is faster begins one, rad/s.
+/// Rate at which a fast turn starts, rad/s.
 const FAST: f32 = 7.0;
-/// It is over when the vehicle has turned no faster than this, rad/s, for so long, s.
+/// It ends when the rate has stayed below `CALM`, rad/s, for `SETTLES`, s.
 const CALM: f32 = 1.0;
 const SETTLES: f32 = 0.1;
 

@@ -15,7 +15,7 @@ const BARO_REACH: f32 = 2.0;
 const LONGEST_BARO: f32 = 0.5;
 /// A receiver that is silent for longer leaves the height to the barometer.
 const FIX_SILENT: Duration = Duration::from_secs(2);
-/// A range that has not been used for so long holds neither height nor climb rate: six readings.
+/// After a silence of six readings the range holds neither height nor climb rate.
 const RANGE_SILENT: Duration = Duration::from_millis(200);
 /// Variance of the height, m², beyond which the barometer's first offset is as uncertain as that height: after a receiver's first fix.
 const VAGUE_HEIGHT: f32 = 1.0;

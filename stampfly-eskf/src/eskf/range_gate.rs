@@ -2,19 +2,19 @@
 //!
 //! | a range that | is |
 //! |---|---|
-//! | leaps: it is far from the one before and from what is expected | rejected until another one confirms it |
-//! | repeats itself | left out from the fifth time on: what it would say of a climb is not measured |
-//! | is rejected for the lock-out time, and the first of them jumped | another surface: no vehicle moves so far from one reading to the next |
+//! | leaps: it is far from the one before and from the expected one | rejected until another one confirms it |
+//! | repeats itself | left out from the fifth time on: it measures no climb |
+//! | is rejected for the lock-out time, and the first of them jumped | a new surface: no vehicle moves as far between two readings |
 
 use stampfly_types::{Instant, math};
 
-/// A range so far from its predecessor jumps, m.
+/// Smallest change from the range before that is a jump, m.
 const JUMP: f32 = 0.15;
-/// One so far from its predecessor and from what is expected leaps, m.
+/// Smallest change from the range before, and from the expected range, that is a leap, m.
 const LEAP: f32 = 0.05;
-/// A range that repeats itself so often is left out: 0.13 s, in which a take-off rises by 4 cm.
+/// Number of repetitions after which a range is left out: 0.13 s, in which a take-off rises by 4 cm.
 const UNUSED: u32 = 4;
-/// What the vehicle did while there was no range for so long is no jump, s.
+/// After a silence of this length, s, a change is the vehicle's motion and not a jump.
 const SILENT: f32 = 0.2;
 
 /// What may be done with a range.

@@ -5,7 +5,7 @@
 //! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
 //! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
 //! | a turn that is faster than flow follows | variance of the tilt | no |
-//! | whoever judges sensors ([`correct`](crate::Estimator::correct)) | attitude, velocity, biases | no |
+//! | a monitor of the sensors ([`correct`](crate::Estimator::correct)) | attitude, velocity, biases | no |
 //! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
 
 use super::*;

@@ -77,7 +77,7 @@ pub(super) struct ImuVerdict {
 }
 
 impl ImuMonitor {
-    /// Takes a sample. `suspect` says that it asks for the impossible.
+    /// Takes a sample. `suspect`: it implies an angular acceleration that no body has.
     pub(super) fn step(&mut self, config: &FailsafeConfig, imu: &ImuData, suspect: bool) -> ImuVerdict {
         // Garbage has a count of its own.
         if !suspect {

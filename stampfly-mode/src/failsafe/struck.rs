@@ -11,14 +11,14 @@ use stampfly_types::{Vec3, frame};
 /// Cosine of the largest tilt, 60°, at which what is above the body is above the vehicle.
 const UPRIGHT: f32 = 0.5;
 
-/// What a sample has shown, with a blow by this force, body FRD, m/s², as
-/// [`STRUCK`](Alerts::STRUCK) where it came from above.
-pub(super) fn judged(found: Alerts, input: &FailsafeInput<'_>, force: &Vec3) -> Alerts {
+/// Replaces [`IMPACT`](Alerts::IMPACT) by [`STRUCK`](Alerts::STRUCK) where the blow came from above.
+/// `force`: the specific force of the blow, body FRD, m/s².
+pub(super) fn from_above(found: Alerts, input: &FailsafeInput<'_>, force: &Vec3) -> Alerts {
     let estimate = input.estimate;
     let upright = estimate.valid.contains(Validity::TILT) && frame::cos_tilt(&estimate.attitude) > UPRIGHT;
     // What presses on the body from above accelerates it downwards.
-    let from_above = force.z > 0.0 && force.z * force.z > force.x * force.x + force.y * force.y;
-    if found.contains(Alerts::IMPACT) && upright && from_above {
+    let pressed = force.z > 0.0 && force.z * force.z > force.x * force.x + force.y * force.y;
+    if found.contains(Alerts::IMPACT) && upright && pressed {
         found.without(Alerts::IMPACT).with(Alerts::STRUCK)
     } else {
         found

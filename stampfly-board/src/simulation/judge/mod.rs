@@ -463,7 +463,7 @@ impl Judge {
         if let Some((at, height)) = self.stopped {
             let at_the_end = !self.stopped_early && height <= OFF_GROUND && crash.is_none();
             if !at_the_end && (self.stopped_by_fault(at) || self.stopped_by_blow) {
-                // What has never left the ground is not dropped.
+                // A vehicle that has never left the ground does not fall.
                 let class = if self.highest <= OFF_GROUND { Class::Landed } else { Class::Cut };
                 return (class, format!("the motors stopped at {:.1} m{}", height.max(0.0), self.alerts_at(at)));
             }
