@@ -225,20 +225,20 @@ impl Cases {
 }
 
 /// Draws from a flight's seed.
-struct Dice(Noise);
+pub(super) struct Dice(pub Noise);
 
 impl Dice {
     fn below(&mut self, count: usize) -> usize {
         ((self.0.unit() * count as f64) as usize).min(count.saturating_sub(1))
     }
 
-    fn one<'t, T>(&mut self, of: &'t [T]) -> Option<&'t T> {
+    pub fn one<'t, T>(&mut self, of: &'t [T]) -> Option<&'t T> {
         let place = self.below(of.len());
         of.get(place)
     }
 
     /// A number between two, with three digits.
-    fn round(&mut self, low: f64, high: f64) -> f64 {
+    pub fn round(&mut self, low: f64, high: f64) -> f64 {
         let value = low + (high - low) * self.0.unit();
         // Reading what is written gives the nearest number, as it will be read from the command line.
         format!("{value:.2e}").parse().unwrap_or(value)

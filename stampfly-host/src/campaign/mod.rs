@@ -11,9 +11,11 @@
 //! | [`summary`], [`page`] | faults × moments, failures; as CSV and HTML |
 //! | [`shrink`] | the smallest flight in which the same goes wrong |
 //! | [`sticks`] | every stick file in every mode that makes sense |
+//! | [`envelope`] | sound vehicles through everything that may be flown and met |
 //! | [`parallel`] | work on every core |
 
 pub mod case;
+pub mod envelope;
 pub mod file;
 pub mod flight;
 pub mod page;

@@ -113,7 +113,7 @@ pub struct Flight {
     pub mode: Option<String>,
     /// The seed.
     pub seed: u64,
-    /// Did it end well?
+    /// Did it end well, and without anything that a sound vehicle did by itself?
     pub ended_well: bool,
     /// How it ended.
     pub outcome: String,
@@ -167,7 +167,8 @@ fn finished<O: Verdict>(flight: Flight, flown: &Flown<O>, hash: u64) -> Flight {
     let findings = serde_json::to_value(flown.outcome.findings()).unwrap_or_default();
     let unjudged = Findings { outcome: UNJUDGED.into(), ..Findings::default() };
     let Findings { outcome, reason, violations, interventions } = serde_json::from_value(findings).unwrap_or(unjudged);
-    let (ended_well, duration_s) = (flown.outcome.succeeded(), flown.duration.seconds_f64());
+    let unhindered = !interventions.iter().any(|one| one.sound);
+    let (ended_well, duration_s) = (flown.outcome.succeeded() && unhindered, flown.duration.seconds_f64());
     let log_hash = format!("{hash:016x}");
     Flight { ended_well, outcome, reason, violations, interventions, duration_s, log_hash, ..flight }
 }

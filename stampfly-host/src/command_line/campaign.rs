@@ -40,7 +40,7 @@ impl ForVehicle for Campaign<'_> {
             options.scene.print_list::<V>(options.seed)?;
             return Ok(ExitCode::SUCCESS);
         }
-        if !options.sticks.is_empty() {
+        if options.envelope || !options.sticks.is_empty() {
             return stick_campaign::run::<V>(options);
         }
         if options.faults {

@@ -1,9 +1,11 @@
-//! `stampfly campaign --sticks`: stick files, each in every mode that makes sense. Exit code 1 when
-//! a flight did not end well.
+//! `stampfly campaign --sticks`: stick files, each in every mode that makes sense; and
+//! `stampfly campaign --envelope`: flights of sound vehicles. Exit code 1 when a flight did not end
+//! well.
 
+use crate::campaign::envelope::Envelope;
 use crate::campaign::parallel;
 use crate::campaign::rate::Rate;
-use crate::campaign::sticks::{Flight, Sum, cells, files, fly_one, sums};
+use crate::campaign::sticks::{Cell, Flight, Sum, cells, files, fly_one, sums};
 use crate::command_line::arguments::CampaignOptions;
 use crate::command_line::failure::Failure;
 use crate::command_line::terminal;
@@ -20,22 +22,12 @@ const MOST_TOLD: usize = 30;
 const AS_IT_IS: &str = "–";
 
 pub fn run<V: Vehicle>(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    let flown = options.scene.options(options.scene.jitter);
-    let mut all = Vec::new();
-    for file in files(&options.sticks)? {
-        let sticks = options.with_sticks.options(&file, options.scene.mode.clone());
-        all.extend(cells::<V>(&file, &sticks, &flown)?);
-    }
-    let seeds = usize::try_from(options.flights)?;
-    let count = all.len().checked_mul(seeds).ok_or("--flights: too many")?;
-    let bar = terminal::bar(count as u64, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");
+    let planned = if options.envelope { envelope::<V>(options)? } else { each_in_every_mode::<V>(options)? };
+    let bar = terminal::bar(planned.len() as u64, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");
     let begun = Instant::now();
-    let flights = parallel::each(count, parallel::workers(count, None), &|place| {
-        let nth = (place % seeds) as u64;
-        let mut cell = all.get(place / seeds)?.clone();
-        // Every flight has its own delays, too.
-        cell.options.jitter = cell.options.jitter.map(|seed| seed.wrapping_add(nth));
-        let flight = fly_one::<V>(&cell, options.seed.wrapping_add(nth));
+    let flights = parallel::each(planned.len(), parallel::workers(planned.len(), None), &|place| {
+        let (cell, seed) = planned.get(place)?;
+        let flight = fly_one::<V>(cell, *seed);
         bar.inc(1);
         Some(flight)
     });
@@ -48,6 +40,37 @@ pub fn run<V: Vehicle>(options: &CampaignOptions) -> Result<ExitCode, Failure> {
         print(&flights, &sums, begun.elapsed().as_secs_f64());
     }
     Ok(if flights.iter().all(|flight| flight.ended_well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Cells with the seeds of their flights, those of a cell together.
+type Planned = Vec<(Cell, u64)>;
+
+/// Every file in every mode, with each of the seeds.
+fn each_in_every_mode<V: Vehicle>(options: &CampaignOptions) -> Result<Planned, Failure> {
+    let flown = options.scene.options(options.scene.jitter);
+    let mut planned = Vec::new();
+    for file in files(&options.sticks)? {
+        let sticks = options.with_sticks.options(&file, options.scene.mode.clone());
+        for cell in cells::<V>(&file, &sticks, &flown)? {
+            planned.extend((0..options.flights).map(|nth| {
+                let mut cell = cell.clone();
+                // Every flight has its own delays, too.
+                cell.options.jitter = cell.options.jitter.map(|seed| seed.wrapping_add(nth));
+                (cell, options.seed.wrapping_add(nth))
+            }));
+        }
+    }
+    Ok(planned)
+}
+
+/// Flights of the envelope, those of a mission or a file in a mode together.
+fn envelope<V: Vehicle>(options: &CampaignOptions) -> Result<Planned, Failure> {
+    let sticks = if options.sticks.is_empty() { Vec::new() } else { files(&options.sticks)? };
+    let envelope = Envelope { seed: options.seed, sticks, options: options.scene.options(options.scene.jitter) };
+    let flights = (0..options.flights).map(|index| envelope.flight::<V>(index));
+    let mut planned = flights.collect::<Result<Planned, _>>()?;
+    planned.sort_by(|(one, _), (other, _)| (&one.file, &one.mode).cmp(&(&other.file, &other.mode)));
+    Ok(planned)
 }
 
 fn print_json(flights: &[Flight], sums: &[Sum]) {

@@ -117,6 +117,19 @@ impl StickFile {
         if rows.is_empty() { Err(StickErrorKind::NoRows.at(0)) } else { Ok(Self { rows }) }
     }
 
+    /// Sticks drawn from a seed: anywhere, in any mode, for 5 to 25 s, with the hover throttle at the
+    /// centre.
+    ///
+    /// ```
+    /// use stampfly_sim::sticks::StickFile;
+    /// let drawn = StickFile::drawn(7);
+    /// assert_eq!(StickFile::parse(drawn.to_string().as_bytes()), Ok(drawn));
+    /// ```
+    #[must_use]
+    pub fn drawn(seed: u64) -> Self {
+        Self { rows: super::drawn::rows(seed) }
+    }
+
     /// Its rows, in order of time. There is at least one.
     #[must_use]
     pub fn rows(&self) -> &[Row] {

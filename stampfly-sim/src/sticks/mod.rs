@@ -24,6 +24,7 @@
 //! | part | what it is |
 //! |---|---|
 //! | [`StickFile`], [`Row`] | the rows; reads and writes the table |
+//! | [`DRAWN`] | sticks that are drawn from a seed, in place of a file |
 //! | [`StickError`] | why a table is none, with the line |
 //! | [`Player`] | which row the transmitter sends when |
 //! | [`StickOptions`], [`Sticks`], [`Start`] | how a file is to be flown: as typed, and resolved for a vehicle |
@@ -31,6 +32,7 @@
 //!
 //! Not for a vehicle that flies by itself: that has a mission.
 
+mod drawn;
 mod error;
 mod file;
 mod options;
@@ -39,6 +41,6 @@ mod throttle;
 
 pub use error::{StickError, StickErrorKind};
 pub use file::{LATEST, LONGEST_LINE, MODES, MOST_BYTES, MOST_ROWS, Row, StickFile, mode_named};
-pub use options::{START_HEIGHT, Start, StickOptions, Sticks};
+pub use options::{DRAWN, START_HEIGHT, Start, StickOptions, Sticks};
 pub use player::{Frame, Player};
 pub use throttle::Throttle;

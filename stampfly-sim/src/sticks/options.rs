@@ -22,11 +22,14 @@ const LOW_FOR: Duration = Duration::from_millis(100);
 /// The hover throttle of a file, measured in it.
 const MEDIAN: &str = "median";
 
+/// `drawn:7` in place of a file are [sticks that are drawn](StickFile::drawn) from the seed 7.
+pub const DRAWN: &str = "drawn:";
+
 /// How a stick file is to be flown, as it is typed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StickOptions {
-    /// A file, or what is in one: a text of more than one line.
+    /// A file; [`DRAWN`] and a seed; or what is in a file: a text of more than one line.
     pub file: String,
     /// The vehicle's flight mode in place of the file's.
     pub mode: Option<String>,
@@ -74,6 +77,10 @@ impl StickOptions {
         if self.file.contains('\n') {
             return StickFile::parse(self.file.as_bytes()).map_err(|error| format!("--sticks: {error}"));
         }
+        if let Some(seed) = self.file.strip_prefix(DRAWN) {
+            let seed = seed.parse().map_err(|_| format!("--sticks {}: '{seed}' is no seed", self.file))?;
+            return Ok(StickFile::drawn(seed));
+        }
         StickFile::read(Path::new(&self.file)).map_err(|error| format!("--sticks {}: {error}", self.file))
     }
 
@@ -89,6 +96,7 @@ impl StickOptions {
 
     fn hover(&self, file: &StickFile) -> Result<Option<f32>, SetupError> {
         match self.hover_throttle.as_deref() {
+            None if self.file.starts_with(DRAWN) => Ok(Some(0.0)),
             None => Ok(None),
             Some(MEDIAN) => Ok(throttle::median(file)),
             Some(text) => {
