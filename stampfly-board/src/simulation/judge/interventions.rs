@@ -40,6 +40,8 @@ const UNKNOWN: Alerts = Alerts::RANGE_IMPLAUSIBLE
     .with(Alerts::ESTIMATE_DIVERGED);
 /// Of those, what is no news where no floor is in reach.
 const SEES_NOTHING: Alerts = Alerts::TOF_LOST.with(Alerts::FLOW_LOST);
+/// Alerts of a battery that does not carry the vehicle.
+const SPENT: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::NO_LIFT);
 /// The name of no alert.
 const NONE: &str = "NONE";
 
@@ -65,6 +67,9 @@ pub struct Intervention {
     /// It was an alert that stops motors in any phase, or the cut-off.
     #[serde(skip)]
     pub by_protection: bool,
+    /// It landed because its battery did not carry it any more.
+    #[serde(skip)]
+    pub spent: bool,
 }
 
 impl Intervention {
@@ -122,6 +127,12 @@ impl Interventions {
     /// The first one that stopped the motors in the air for a protection's sake.
     pub fn cut_in_air(&self) -> Option<&Intervention> {
         self.list.iter().find(|one| one.action == "cut" && one.by_protection && one.height_m > OFF_GROUND.into())
+    }
+
+    /// Since when a mode that holds the height has flown a vehicle that nothing has touched, when the
+    /// truth was last looked at.
+    pub fn held_since(&self) -> Option<Instant> {
+        self.soundness.state().held_since
     }
 
     /// Looks at the truth.
@@ -217,6 +228,7 @@ impl Interventions {
             tilt_deg: f64::from(state.tilt().to_degrees()),
             attitude_error_deg: f64::from(state.attitude_error().to_degrees()),
             by_protection: self.cut_off || self.alerts.intersects(CUT),
+            spent: action == "land" && !state.carried && self.alerts.intersects(SPENT),
         });
     }
 }

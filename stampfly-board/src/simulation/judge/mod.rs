@@ -22,11 +22,15 @@
 //! A flight by a stick file has no commanded path: it may end anywhere, and a person's sticks can
 //! fly a sound vehicle into the floor. So `flown-away` and `landed` are none of its ends, `cut` is
 //! one that was stopped in the air by itself (`interventions.rs`), and every end from `refused` to
-//! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound. Where
-//! the file begins armed, `refused` is not.
+//! `crashed` is acceptable as long as the vehicle did nothing by itself while it was sound, and no
+//! mode that holds the height has flown it into the ground. Where the file begins armed, `refused`
+//! is not.
 //!
 //! A flight that [flies on](VehicleConfig::flies_on) where a protection would have stopped its
 //! motors in the air is over as soon as it has crashed or flown away, and ends as that.
+//!
+//! A vehicle that lands because its battery does not carry it any more has ended well, whatever is
+//! left of its mission.
 //!
 //! What never may happen is the table in `judge/invariants.rs`, and `I12`: every fault began, and changed something.
 
@@ -75,6 +79,9 @@ const TURNS: f32 = 1_000.0;
 const COAST: Duration = Duration::from_millis(150);
 /// Hardest touch-down that is none of a crash, m/s.
 const HARD: f32 = 1.0;
+/// A mode that holds the height has arrested any fall after this time: half a second to turn upright
+/// from any attitude, and 4 m/s at 4 m/s², which is what motors that lift 1.4 of its weight do.
+const ARRESTS: Duration = Duration::from_millis(1_500);
 /// Largest tilt of a vehicle that has landed, degrees.
 const TILTED: f32 = 20.0;
 /// Motors that were off for so long after a fault stay off; the second is for a vehicle that has not been armed yet, the third
@@ -146,6 +153,8 @@ struct Touch {
     tilt: f32,
     /// The vehicle was landing.
     landing: bool,
+    /// A mode that holds the height has had the time to arrest any fall.
+    held: bool,
 }
 
 pub(super) struct Judge {
@@ -314,6 +323,7 @@ impl Judge {
     pub fn see(&mut self, sight: &Sight<'_>) {
         let Sight { now, truth, clearance, strikes, status, done } = *sight;
         self.strikes(now, strikes);
+        let held = self.interventions.held_since().is_some_and(|since| now.since(since) > ARRESTS);
         self.interventions.see(sight);
         self.clearance = clearance;
         (self.now, self.done) = (now, done);
@@ -332,7 +342,7 @@ impl Judge {
         if touches {
             // A leg that touches first turns over what its propellers push, and sets upright what they no longer do.
             let tilt = if self.motors_on { frame::tilt(&truth.attitude).to_degrees() } else { 0.0 };
-            self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt, landing });
+            self.touches.push(Touch { at: now, speed: sink.max(0.0), tilt, landing, held });
         }
         self.course.visit(&truth.position);
         let (top, beside) = self.course.commanded(done, &truth.position);
@@ -394,8 +404,8 @@ impl Judge {
         };
         let flew = count > 0 || outcome != Class::Refused;
         let as_expected = match self.sticks {
-            None => outcome.is_within(expected) && flew,
-            Some(arms) => outcome <= expected && self.needless().is_none() && (flew || !arms),
+            None => (outcome.is_within(expected) || outcome == Class::Landed && self.is_spent()) && flew,
+            Some(arms) => outcome <= expected && self.needless().is_none() && (flew || !arms) && !self.dropped(begun),
         };
         // Motors that were off already stayed off from the beginning of the fault.
         let stopped = if self.turned { self.stopped } else { Some((self.now, 0.0)) };
@@ -521,7 +531,8 @@ impl Judge {
         } else if let Some(Intervention { alert, height_m, .. }) = stopped {
             (Class::Cut, format!("{alert} stops the motors at {height_m:.1} m of a vehicle that is not sound"))
         } else if let Some(crash) = crash {
-            (Class::Crashed, format!("{crash}; so its sticks flew it"))
+            let by = if self.dropped(begun) { "in a mode that holds the height" } else { "so its sticks flew it" };
+            (Class::Crashed, format!("{crash}; {by}"))
         } else if !self.new_alerts.is_empty() {
             (Class::Degraded, format!("alerts{}", listed(&self.new_alerts)))
         } else {
@@ -534,17 +545,33 @@ impl Judge {
         self.interventions.list().iter().find(|one| one.sound)
     }
 
-    /// Why the flight is a crash, if it is one.
-    fn crash(&self, begun: Option<Instant>) -> Option<String> {
+    /// Is the first thing that the vehicle did by itself to land, because its battery did not carry it?
+    fn is_spent(&self) -> bool {
+        self.interventions.list().first().is_some_and(|one| one.spent)
+    }
+
+    /// Did a mode that holds the height fly it into the ground? What comes after that touch is not
+    /// asked.
+    fn dropped(&self, begun: Option<Instant>) -> bool {
+        self.crashes(begun).is_some_and(|touch| touch.held && touch.speed > HARD)
+    }
+
+    /// The first touch that is a crash.
+    fn crashes(&self, begun: Option<Instant>) -> Option<&Touch> {
         let from = begun.or(self.start).unwrap_or(self.now);
         let given_up = self.runs_on || self.is_caught();
         let until = self.stopped.filter(|_| given_up).map_or(self.now, |(at, _)| at);
         let mut touches = self.touches.iter().filter(|touch| (from..=until).contains(&touch.at));
-        let hard = |touch: &&Touch| touch.speed > HARD || touch.tilt > TILTED;
-        if let Some(Touch { at, speed, tilt, .. }) = touches.find(hard) {
+        touches.find(|touch| touch.speed > HARD || touch.tilt > TILTED)
+    }
+
+    /// Why the flight is a crash, if it is one.
+    fn crash(&self, begun: Option<Instant>) -> Option<String> {
+        if let Some(Touch { at, speed, tilt, .. }) = self.crashes(begun) {
             let how = if *speed > HARD { format!("at {speed:.1} m/s") } else { format!("tilted by {tilt:.0} deg") };
             return Some(format!("touched the ground {how}{}", self.alerts_at(*at)));
         }
+        let given_up = self.runs_on || self.is_caught();
         let lies = self.last.filter(|truth| !given_up && truth.contact)?;
         let tilt = frame::tilt(&lies.attitude).to_degrees();
         (tilt > TILTED).then(|| format!("lies tilted by {tilt:.0} deg{}", self.alerts_at(self.now)))

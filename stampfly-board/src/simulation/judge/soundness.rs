@@ -5,7 +5,7 @@
 //! | does the body turn as the torque says, about roll and pitch? | over 0.1 s the rates change by what the demanded torque makes, as far as it was met, and by no more beside that than half of what a rotor that is lost at hover would add |
 //! | does the estimate know the vertical? | off by less than what the vehicle itself calls a mismatch of its tilt, [`FailsafeConfig::tilt_mismatch`](stampfly_mode::FailsafeConfig) |
 //! | was it left alone? | it has not touched anything for 0.1 s |
-//! | does the battery carry it? | its voltage is above the critical one |
+//! | does the battery carry it? | its voltage is above the critical one, and motors that get all there is make it climb, in the mean over a second |
 //! | does nothing act on it that a flight with a fault has? | no fault is active |
 //!
 //! All of it is the truth's: nothing here is a detector's opinion.
@@ -13,6 +13,7 @@
 use super::sight::Sight;
 use crate::VehicleConfig;
 use crate::airframe::AIRFRAME;
+use stampfly_mode::transitions::is_airborne;
 use stampfly_sim::Truth;
 use stampfly_types::messages::{ControlOutput, MotorOutput, StateEstimate};
 use stampfly_types::{Duration, Instant, Quat, Vec3, frame, math};
@@ -24,6 +25,11 @@ const WINDOW: Duration = Duration::from_millis(100);
 /// Of the rate that a lost rotor makes in that time, which is told from a sound vehicle in the
 /// middle.
 const HALF: f32 = 0.5;
+/// A battery is spent when so much of the thrust cannot be made, and it climbs by less than this, m/s,
+/// in the mean over this time, s.
+const MISSING: f32 = 0.02;
+const CLIMBS: f32 = 0.2;
+const MEAN: f32 = 1.0;
 /// A touch is over after this time.
 const TOUCHED: Duration = Duration::from_millis(100);
 /// Longest way to the floor along the body's axis that the range finder measures, m: the chip's.
@@ -37,12 +43,16 @@ const IN_REACH: Duration = Duration::from_millis(500);
 pub(super) struct State {
     /// By the table of the [module](self).
     pub sound: bool,
+    /// Its battery carries it.
+    pub carried: bool,
     /// The floor is in the reach of the sensors that look down, and has been for a while.
     pub sees_floor: bool,
     /// Above the floor, m.
     pub height: f32,
     /// m/s.
     pub speed: f32,
+    /// Since when a mode that holds the height has flown it, left alone and carried by its battery.
+    pub held_since: Option<Instant>,
     attitude: Quat,
     /// Cosine of the angle between the true vertical and the estimated one.
     cos_error: f32,
@@ -82,6 +92,12 @@ pub(super) struct Soundness {
     strikes: u64,
     touched: Option<Instant>,
     touches: bool,
+    /// Share of the thrust that the motors could not make, and the means of it and of the climb rate,
+    /// m/s.
+    unmet: f32,
+    missing: f32,
+    climb: f32,
+    last: Option<Instant>,
     out_of_reach: Option<Instant>,
     state: State,
 }
@@ -99,6 +115,10 @@ impl Soundness {
             strikes: 0,
             touched: None,
             touches: false,
+            unmet: 0.0,
+            missing: 0.0,
+            climb: 0.0,
+            last: None,
             out_of_reach: None,
             state: State::default(),
         }
@@ -114,14 +134,16 @@ impl Soundness {
 
     pub fn driven(&mut self, output: &MotorOutput) {
         let [roll, pitch, yaw, _] = output.unmet.map(MotorOutput::met);
+        self.unmet = 1.0 - MotorOutput::met(output.unmet[3]);
         self.met = if output.armed { Vec3::new(roll, pitch, yaw) } else { Vec3::zeros() };
     }
 
     /// Looks at the truth. `faulty`: a fault is active.
     pub fn see(&mut self, sight: &Sight<'_>, faulty: bool) {
-        let Sight { now, truth, clearance, strikes, .. } = *sight;
+        let Sight { now, truth, clearance, strikes, status, .. } = *sight;
         let follows = self.follows(now, truth);
-        if truth.contact || strikes > self.strikes {
+        let meets = truth.contact || strikes > self.strikes;
+        if meets {
             (self.touched, self.strikes) = (Some(now), strikes);
         }
         let up = |attitude: &Quat| attitude.inverse() * Vec3::new(0.0, 0.0, -1.0);
@@ -132,12 +154,19 @@ impl Soundness {
         }
         let touched = self.touched.is_some_and(|touched| now.since(touched) <= TOUCHED);
         self.touches = touched;
-        let carried = truth.battery_voltage > self.battery_critical;
+        let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).seconds());
+        self.missing += (self.unmet - self.missing) * (dt / (MEAN + dt));
+        self.climb += (-truth.velocity.z - self.climb) * (dt / (MEAN + dt));
+        let lifts = self.missing < MISSING || self.climb > CLIMBS;
+        let carried = truth.battery_voltage > self.battery_critical && lifts;
+        let is_held = is_airborne(status.phase) && !status.mode.is_manual() && carried && !meets && !faulty;
         self.state = State {
+            carried,
             sound: follows && cos_error > self.cos_mismatch && !touched && carried && !faulty,
             sees_floor: self.out_of_reach.is_none_or(|out| now.since(out) > IN_REACH),
             height: clearance,
             speed: truth.velocity.norm(),
+            held_since: is_held.then_some(self.state.held_since.unwrap_or(now)),
             attitude: truth.attitude,
             cos_error,
         };
