@@ -7,9 +7,10 @@
 
 use stampfly_types::GRAVITY;
 use stampfly_types::math::larger;
+use stampfly_types::messages::MotorOutput;
 
 use crate::airframe::Airframe;
-use crate::bound::{possible_thrust, symmetric, within};
+use crate::bound::{possible_thrust, symmetric, tan_lean_max, within};
 use crate::pid::{Pid, PidGains};
 use crate::rate::integration;
 
@@ -106,6 +107,11 @@ pub struct AltitudeController {
     config: AltitudeConfig,
     climb: Pid,
     hover_thrust: f32,
+    /// Upward thrust that the last step asked for, and the whole thrust that there is for it, N.
+    needed: f32,
+    available: f32,
+    /// Mean share of the thrust that the motors made.
+    met: f32,
     /// One over the learning time, 1/s.
     learning_rate: f32,
 }
@@ -115,6 +121,10 @@ impl AltitudeController {
     const COS_TILT_MIN: f32 = 0.5;
     /// Steady enough to learn from: speed error, m/s.
     const STEADY: f32 = 0.15;
+    /// Time constant of the mean share of the thrust that is met, s: torques take some of it for moments.
+    const MEETS: f32 = 0.2;
+    /// Below this share something is missing.
+    const ALL: f32 = 0.99;
 
     /// Loops at rest, hover thrust as configured.
     #[must_use]
@@ -123,6 +133,9 @@ impl AltitudeController {
             config: *config,
             climb: Pid::new(config.velocity, config.acceleration_max),
             hover_thrust: config.hover_thrust,
+            needed: 0.0,
+            available: config.thrust_max,
+            met: 1.0,
             learning_rate: if config.learning_time > 0.0 { 1.0 / config.learning_time } else { 0.0 },
         }
     }
@@ -144,22 +157,34 @@ impl AltitudeController {
         if limits.learn && (target - climb.velocity).abs() < Self::STEADY {
             self.learn(dt);
         }
-        let wanted = self.hover_thrust * (1.0 - (climb.acceleration + feedback) * (1.0 / GRAVITY))
-            / larger(climb.cos_tilt, Self::COS_TILT_MIN);
+        self.needed = self.hover_thrust * (1.0 - (climb.acceleration + feedback) * (1.0 / GRAVITY));
+        let wanted = self.needed / larger(climb.cos_tilt, Self::COS_TILT_MIN);
         // Upside down, thrust only pushes into the ground.
         let wanted = if climb.cos_tilt > 0.0 { wanted } else { 0.0 };
-        self.limit(larger(wanted, self.config.thrust_min_share * self.hover_thrust), limits)
+        let thrust = self.limit(larger(wanted, self.config.thrust_min_share * self.hover_thrust), limits);
+        self.met += (MotorOutput::met(limits.unmet) - self.met) * (dt / (Self::MEETS + dt));
+        self.available = if self.met < Self::ALL { thrust * self.met } else { self.config.thrust_max };
+        thrust
+    }
+
+    /// Tangent of the largest lean at which the thrust that there is makes what the last step asked for
+    /// upwards: height comes before place. Not less than 15°, and no limit for a throttle stick.
+    #[must_use]
+    pub fn tan_lean_max(&self) -> f32 {
+        tan_lean_max(self.available, self.needed)
     }
 
     /// Collective thrust, N, to come down slowly without knowing height or speed.
     #[must_use]
-    pub fn descend(&self, limits: &ThrustLimits) -> f32 {
+    pub fn descend(&mut self, limits: &ThrustLimits) -> f32 {
+        self.needed = 0.0;
         self.limit(self.config.descend_share * self.hover_thrust, limits)
     }
 
     /// Collective thrust, N, for a throttle stick: 0 to 1.
     #[must_use]
-    pub fn manual(&self, throttle: f32) -> f32 {
+    pub fn manual(&mut self, throttle: f32) -> f32 {
+        self.needed = 0.0;
         within(throttle * self.config.thrust_max, 0.0, self.config.thrust_max)
     }
 

@@ -4,7 +4,7 @@
 //! somebody may have set wrongly. These keep the value instead: a wrong bound is then no bound. They are also a few
 //! instructions shorter, because they leave NaN as it is for the caller to catch.
 
-use stampfly_types::math::{larger, smaller};
+use stampfly_types::math::{self, larger, smaller};
 
 /// The value, at least `low` and at most `high`. One comparison after the other, as vectors have them: of a value and a bound.
 #[inline]
@@ -27,9 +27,34 @@ pub(crate) fn possible_thrust(thrust: f32, max: f32, ceiling: f32, hover: f32) -
     if thrust.is_finite() { within(thrust, 0.0, limit) } else { 0.0 }
 }
 
+/// Slope of the lean that is left when the thrust does not suffice: 15° cost 3.5 % of it.
+const TAN_LEAN_MIN: f32 = 0.268;
+/// Slope that is no limit: 89.9°.
+const TAN_ANY: f32 = 1e3;
+
+/// Tangent of the largest lean at which so much thrust, N, makes what is needed upwards, N: height
+/// comes before place. Not less than 15°, and [`TAN_ANY`] where nothing is needed.
+pub(crate) fn tan_lean_max(available: f32, needed: f32) -> f32 {
+    if needed <= 0.0 {
+        return TAN_ANY;
+    }
+    let ratio = smaller(available / needed, TAN_ANY);
+    larger(math::sqrt(larger(ratio * ratio - 1.0, 0.0)), TAN_LEAN_MIN)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lean_leaves_the_thrust_that_is_needed_upwards() {
+        for available in [0.4, 0.5, 0.6] {
+            let cos = math::cos(math::atan2(tan_lean_max(available, 0.36), 1.0));
+            assert!((available * cos - 0.36).abs() < 1e-3, "{available} N");
+        }
+        assert_eq!(tan_lean_max(0.3, 0.36), TAN_LEAN_MIN, "what is left without enough of it");
+        assert_eq!(tan_lean_max(0.6, 0.0), TAN_ANY, "a throttle stick asks for nothing upwards");
+    }
 
     #[test]
     fn the_ceiling_is_a_share_of_hover_thrust() {

@@ -217,7 +217,12 @@ impl<R> CascadeController<R> {
             Horizontal::Lean { forward, right } => {
                 self.path = None;
                 self.position.reset();
-                return (lean(forward, right, self.sin_lean_max, &estimate.attitude), Vec3::zeros());
+                let tan = self.altitude.tan_lean_max();
+                let sin = tan / math::sqrt(1.0 + tan * tan);
+                return (
+                    lean(forward, right, math::smaller(self.sin_lean_max, sin), &estimate.attitude),
+                    Vec3::zeros(),
+                );
             }
             Horizontal::Rates { .. } | Horizontal::Damp | Horizontal::Nothing => {
                 self.path = None;
@@ -232,7 +237,8 @@ impl<R> CascadeController<R> {
         let per_weight = 1.0 / carried;
         let (mut x, mut y) = (demand.x * per_weight, demand.y * per_weight);
         let slope_squared = x * x + y * y;
-        let tan_max = math::smaller(self.tan_tilt_max, intent.tan_tilt_max);
+        let tan_max =
+            math::smaller(math::smaller(self.tan_tilt_max, intent.tan_tilt_max), self.altitude.tan_lean_max());
         if slope_squared > tan_max * tan_max {
             let shorten = tan_max / math::sqrt(slope_squared);
             (x, y) = (x * shorten, y * shorten);

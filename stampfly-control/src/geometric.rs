@@ -14,7 +14,7 @@ use stampfly_types::{GRAVITY, Instant, Quat, Vec3, math};
 
 use crate::airframe::Airframe;
 use crate::attitude;
-use crate::bound::{possible_thrust, symmetric, within};
+use crate::bound::{possible_thrust, symmetric, tan_lean_max, within};
 use crate::cascade::StickConfig;
 use crate::controller::{ControlInput, Controller};
 use crate::intent::{Heading, Horizontal, Intent, Vertical};
@@ -171,6 +171,9 @@ impl GeometricController {
             | Horizontal::Damp
             | Horizontal::Nothing => (demand.x, demand.y, self.tan_tilt_max.min(intent.tan_tilt_max)),
         };
+        // A throttle stick asks for nothing upwards.
+        let needed = if matches!(intent.vertical, Vertical::Path | Vertical::Velocity) { up } else { 0.0 };
+        let tan_max = tan_max.min(tan_lean_max(self.config.thrust_max / self.config.mass, needed));
         let length = math::sqrt(x * x + y * y);
         let scale = if length > tan_max * up { tan_max * up / length } else { 1.0 };
         Vec3::new(x * scale, y * scale, -up)

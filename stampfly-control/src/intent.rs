@@ -125,7 +125,10 @@ impl Intent {
         } else {
             let (forward, right) = (stick(input.command.pitch), stick(input.command.roll));
             match input.flight_status.mode {
-                FlightMode::Acro if manual => Horizontal::Rates { forward, right },
+                // What has one leg on the ground turns about it, however still the sticks are.
+                FlightMode::Acro if manual && input.flight_status.phase != FlightPhase::TakeOff => {
+                    Horizontal::Rates { forward, right }
+                }
                 FlightMode::Acro | FlightMode::Stabilize | FlightMode::AltHold => Horizontal::Lean { forward, right },
                 // The sticks of this mode mean velocities; without a commanded axis they mean nothing.
                 FlightMode::PosHold => Horizontal::LEVEL,
@@ -379,6 +382,9 @@ mod tests {
         let rates = Horizontal::Rates { forward: -0.25, right: 0.5 };
         let throttle = Vertical::Throttle(0.6);
         assert_eq!(axes(&flying(FlightMode::Acro, SetpointAxes::NONE)), (rates, throttle));
+        let mut leaves = flying(FlightMode::Acro, SetpointAxes::NONE);
+        leaves.mode.phase = FlightPhase::TakeOff;
+        assert_eq!(axes(&leaves), (lean, throttle), "one leg may still stand");
         assert_eq!(axes(&flying(FlightMode::Stabilize, SetpointAxes::YAW)), (lean, throttle));
         let alt_hold = flying(FlightMode::AltHold, SetpointAxes::POSITION_Z | SetpointAxes::YAW);
         assert_eq!(axes(&alt_hold), (lean, Vertical::Path));

@@ -370,11 +370,12 @@ impl Navigator {
     fn land(&mut self, entered: bool, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         if entered {
             self.forget_route();
-            // What kept the vehicle from climbing after its path does not keep it up there now.
-            let highest = input.estimate.position.z - self.config.landing_lead;
-            if self.path.position().z < highest {
-                self.path.place_vertically(highest, self.path.velocity().z);
-            }
+        }
+        // Nothing that lands climbs: not after a path that something kept it from, nor when a range
+        // shows that it is lower than it was thought to be.
+        let highest = input.estimate.position.z - self.config.landing_lead;
+        if self.path.position().z < highest {
+            self.path.place_vertically(highest, self.path.velocity().z);
         }
         self.steer_heading(input, dt);
         let rate = input.land_detected.descent_rate;
