@@ -11,7 +11,7 @@
 //! | `MOTOR_WEAK` | in the air, a torque about roll and pitch, as far as the motors can make it, that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, such a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
-//! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s | disarmed |
+//! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s; flying, the motors get all there is, make less than 1.2 of the weight, and it does not climb, for 3 s | disarmed |
 //! | `IMU_DEGRADED`, `IMU_LOST` | no inertial sample for 10 ms, 50 ms; one that is not finite is none | with the next sample; `IMU_LOST` disarmed |
 //! | `IMU_FAULTY` | the gyro does not measure: stuck or at full scale, or samples are garbage for more than 50 ms; on the ground a force that is not gravity | disarmed |
 //! | `ACCEL_FAULTY` | the accelerometer is stuck or at full scale, and the gyro is not | disarmed |

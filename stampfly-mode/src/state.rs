@@ -15,6 +15,7 @@ pub const CUT: Alerts = Alerts::IMPACT
 pub const LAND: Alerts = Alerts::CRITICAL_BATTERY
     .with(Alerts::ESTIMATE_DIVERGED)
     .with(Alerts::MOTOR_WEAK)
+    .with(Alerts::NO_LIFT)
     .with(Alerts::IMU_NOISY)
     .with(Alerts::FORCE_IMPLAUSIBLE)
     .with(Alerts::ACCEL_FAULTY)

@@ -80,7 +80,7 @@ impl Event {
                 "`Land` or `Disarm` from any program, arm switch off in a mode that holds height, link lost for too long (at \
                  once without height), height lost for too long, horizontal velocity lost for too long without a pilot, a \
                  take-off that takes too long, after a flip when it is level, or `CRITICAL_BATTERY`, \
-                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `IMU_NOISY`, `FORCE_IMPLAUSIBLE`, `ACCEL_FAULTY`, `STRUCK`"
+                 `ESTIMATE_DIVERGED`, `MOTOR_WEAK`, `NO_LIFT`, `IMU_NOISY`, `FORCE_IMPLAUSIBLE`, `ACCEL_FAULTY`, `STRUCK`"
             }
             Self::Flip => {
                 "a `Flip` of any direction, while a program flies in a mode that holds height: level, at rest, above `flip_height`, \

@@ -3,7 +3,7 @@
 use super::config::FailsafeConfig;
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
-use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, ImuData, Validity};
+use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, ImuData, SensorMask, Validity};
 use stampfly_types::{Instant, Vec3, frame, math};
 
 /// A manual mode may push back this many times as hard on the ground before it counts as tipping: a stick moves while a leg sticks.
@@ -107,7 +107,9 @@ impl AttitudeMonitor {
             // A manual mode flies from the first push of its throttle on, with its legs still on the ground.
             FlightPhase::Flying if !mode.is_manual() => false,
             FlightPhase::TakeOff | FlightPhase::Flying | FlightPhase::Landing => {
-                let low = estimate.valid.contains(Validity::HEIGHT) && estimate.height < config.lift_height;
+                // Only a range knows the height to the length of a leg.
+                let measured = estimate.valid.contains(Validity::HEIGHT) && estimate.sensors.contains(SensorMask::TOF);
+                let low = measured && estimate.height < config.lift_height;
                 // Motors take some time to stop, and what turns already turns on.
                 let soon = |world: &Vec3| {
                     let body = estimate.attitude.inverse_transform_vector(world);

@@ -7,7 +7,9 @@
 //! the take-off on: so what has become so counts from [`WEAK_SHARE`](super::WEAK_SHARE) of a
 //! rotor's share of the weight on, what has been so from [`STANDING`] times that on. Half a
 //! propeller that was broken before looks like a battery that lies askew, and is trimmed as one. A
-//! vehicle on the ground says nothing, because what holds it looks the same.
+//! vehicle on the ground says nothing, because what holds it looks the same. Nor does one whose motors
+//! are hardly asked to push: slow rotors slow down over many of their lags, so what is asked of them
+//! is not what they make.
 //!
 //! With half of a rotor's thrust a vehicle lands. A controller that asks for more than one rotor's whole share about both axes
 //! does not get it: the other three have nothing left, and the vehicle turns over as it comes down. That motor is lost. It shows at
@@ -17,7 +19,7 @@ use super::config::{FailsafeConfig, WEAK_SHARE};
 use super::input::FailsafeInput;
 use crate::lasting::lasts;
 use stampfly_types::messages::{FlightPhase, Validity};
-use stampfly_types::{Duration, Instant};
+use stampfly_types::{Duration, Instant, math};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
@@ -33,6 +35,9 @@ const LOST: f32 = 1.0 / WEAK_SHARE;
 /// A lost motor asks for that this soon after the torque has become uneven. One that asks later is weak, and lands: it is not dropped.
 const SOON: Duration = Duration::from_millis(160);
 
+/// Mean thrust, in shares of the weight, below which a torque is not what the motors make.
+const PUSHES: f32 = 0.5;
+
 /// What is remembered of the torque that the motors are told to make.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -40,6 +45,8 @@ pub(super) struct MotorMonitor {
     /// About roll and pitch, N·m.
     mean: [f32; 2],
     usual: [f32; 2],
+    /// Along the thrust, N.
+    thrust: f32,
     uneven: Option<Instant>,
     uncontrolled: Option<Instant>,
 }
@@ -61,6 +68,14 @@ impl MotorMonitor {
         // knowing it looks the same.
         let above = if known_weak { config.lift_height } else { config.touch_height };
         let lands = phase == FlightPhase::Landing && height.is_some_and(|height| height > above);
+        self.thrust += (input.output.thrust - self.thrust) * WEIGHT;
+        let pushes = math::smaller(self.thrust, input.output.thrust) > PUSHES * config.hover_thrust
+            || config.hover_thrust == f32::INFINITY;
+        if !pushes && (flies || lands) {
+            // What is usual remains so.
+            (self.uneven, self.uncontrolled) = (self.uneven.filter(|_| known_weak), None);
+            return [false; 2];
+        }
         let made = input.torque();
         let made = [made.x, made.y];
         let limits = [config.weak_roll, config.weak_pitch];

@@ -11,7 +11,7 @@ mod tipping;
 use super::*;
 use proptest::prelude::*;
 use stampfly_types::Duration;
-use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, StateEstimate};
+use stampfly_types::messages::{ControlOutput, EstimatorStatus, FlightPhase, PowerData, SensorMask, StateEstimate};
 use stampfly_types::messages::{Finding, Health};
 use stampfly_types::messages::{FlightMode, FlightStatus, SensorFindings, Validity};
 use stampfly_types::{GRAVITY, Quat, Vec3};
@@ -45,7 +45,12 @@ impl Rig {
             failsafe: Failsafe::default(),
             mode,
             now: Instant::ZERO,
-            estimate: StateEstimate { height: 1.0, valid: Validity::ALL, ..Default::default() },
+            estimate: StateEstimate {
+                height: 1.0,
+                valid: Validity::ALL,
+                sensors: SensorMask::TOF,
+                ..Default::default()
+            },
             status: EstimatorStatus::default(),
             findings: SensorFindings::default(),
             battery: PowerData { voltage: 4.1, ..Default::default() },

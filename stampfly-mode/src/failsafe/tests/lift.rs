@@ -47,3 +47,24 @@ fn a_vehicle_of_an_unknown_weight_is_never_given_up() {
     rig.estimate.specific_force = Vec3::new(0.0, 0.0, -GRAVITY);
     assert!((0..2_000).all(|_| !rig.sample(REST, Vec3::zeros()).contains(Alerts::NO_LIFT)));
 }
+
+/// After how many samples is a vehicle in flight found, whose motors make this share of the weight and
+/// cannot make the rest of what is asked for, while it climbs so fast, m/s?
+fn spent(makes: f32, unmet: f32, climb: f32) -> Option<u32> {
+    let mut rig = Rig::flying();
+    rig.failsafe.config.hover_thrust = 0.36;
+    rig.output.thrust = 0.57;
+    rig.thrust = Some(makes * 0.36);
+    rig.unmet = [0.0, 0.0, 0.0, unmet];
+    rig.estimate.velocity.z = -climb;
+    (1..=2_000).find(|_| rig.sample(REST, Vec3::zeros()).contains(Alerts::NO_LIFT))
+}
+
+#[test]
+fn motors_with_all_there_is_that_do_not_lift_it_are_found_in_flight() {
+    assert_eq!(spent(1.0, 0.3, 0.0), Some(1_201), "3 s");
+    assert_eq!(spent(0.9, 0.3, -0.5), Some(1_201), "it sinks");
+    assert_eq!(spent(1.1, 0.3, 0.2), None, "it climbs, slower than it should");
+    assert_eq!(spent(1.5, 0.1, 0.0), None, "something holds it, a ceiling maybe");
+    assert_eq!(spent(1.0, 0.0, 0.0), None, "there is more");
+}

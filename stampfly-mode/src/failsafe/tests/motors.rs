@@ -41,6 +41,21 @@ fn a_torque_that_no_three_rotors_make_is_a_lost_motor() {
     }
 }
 
+/// Rotors that turn slowly slow down over many lags: what is asked of them is not what they make.
+#[test]
+fn a_throttle_that_was_pulled_is_no_weak_motor() {
+    let weak = |thrust: f32| {
+        let mut rig = rig(FlightPhase::Flying, 1.0);
+        rig.failsafe.config.hover_thrust = 0.36;
+        rig.output.thrust = 0.36;
+        found(&mut rig, [0.0, 0.0], 200, Alerts::MOTOR_WEAK);
+        rig.output.thrust = thrust;
+        found(&mut rig, [2.0, -2.0], 400, Alerts::MOTOR_WEAK).is_some()
+    };
+    assert!(weak(0.36) && weak(0.25));
+    assert!(!weak(0.0) && !weak(0.1));
+}
+
 /// Motors at their limit: what the controller asks for and does not get says nothing of a rotor.
 #[test]
 fn a_torque_that_was_not_made_is_neither_a_weak_motor_nor_a_lost_one() {

@@ -147,8 +147,9 @@ fn another_vehicle_waits_as_long_as_its_configuration_says() {
 }
 
 #[test]
-fn a_take_off_that_lifts_nothing_stops_the_motors_and_a_flight_does_not() {
-    for (phase, next) in [(FlightPhase::TakeOff, FlightPhase::IdleGround), (FlightPhase::Flying, FlightPhase::Flying)] {
+fn what_lifts_nothing_stops_its_motors_at_take_off_and_lands_in_flight() {
+    for (phase, next) in [(FlightPhase::TakeOff, FlightPhase::IdleGround), (FlightPhase::Flying, FlightPhase::Landing)]
+    {
         let (mut machine, mut world) = in_phase(phase);
         (world.alerts, world.estimate.height, world.land_detected.contact) =
             (Alerts::NO_LIFT, 0.05, GroundContact::Ground);
