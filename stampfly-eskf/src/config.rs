@@ -69,6 +69,9 @@ pub struct EskfConfig {
     pub flow_min_quality: u8,
     /// Below this distance to the surface flow is not used, m.
     pub flow_min_distance: f32,
+    /// Fastest motion of the picture that the camera follows, rad/s: 7.4 for a PMW3901. A faster one it
+    /// shows as another.
+    pub flow_max_rate: f32,
 
     /// Standard deviation of a barometric altitude, m.
     pub baro_sigma: f32,
@@ -316,6 +319,7 @@ impl Default for EskfConfig {
             flow_delay: 0.004,
             flow_min_quality: 25,
             flow_min_distance: 0.02,
+            flow_max_rate: 7.0,
             baro_sigma: 0.3,
             baro_enable: true,
             baro_backup: false,

@@ -497,9 +497,9 @@ impl Eskf {
     fn publish_sigmas(&mut self) {
         self.status.acceleration_sigma = self.acceleration_sigma();
         self.status.velocity_sigma = self.larger_sigma(VELOCITY);
+        self.status.climb_sigma = self.sigma(VELOCITY + 2);
         self.status.gyro_bias_sigma = self.larger_sigma(GYRO_BIAS);
-        let yaw = self.covariance.get(GYRO_BIAS + 2, GYRO_BIAS + 2);
-        self.status.yaw_bias_sigma = math::sqrt(math::larger(yaw, 0.0));
+        self.status.yaw_bias_sigma = self.sigma(GYRO_BIAS + 2);
     }
 
     /// Standard deviation of the acceleration along body x and y of a vehicle that its thrust carries,
@@ -517,6 +517,11 @@ impl Eskf {
     fn larger_sigma(&self, x: usize) -> f32 {
         let [x, y] = [x, x + 1].map(|index| self.covariance.get(index, index));
         math::sqrt(math::larger(math::larger(x, y), 0.0))
+    }
+
+    /// Standard deviation of one state.
+    fn sigma(&self, index: usize) -> f32 {
+        math::sqrt(math::larger(self.covariance.get(index, index), 0.0))
     }
 
     /// Does drag show the velocity? Only where nothing else does.

@@ -47,11 +47,6 @@ pub struct MonitorConfig {
     pub flow_smooth_s: f32,
     /// Nearer to the floor, m, the picture may be blurred.
     pub flow_sharp_m: f32,
-    /// A turn that is faster, rad/s, moves the picture faster than the camera follows: 7.4 for a
-    /// PMW3901.
-    pub flow_fastest_rad_s: f32,
-    /// Until the body turns no faster than this, rad/s, its readings are wrong.
-    pub flow_calm_rad_s: f32,
     /// To be used again flow has to agree with a motion of this much, m/s,
     pub flow_motion_m_s: f32,
     /// for so long, s.
@@ -107,8 +102,6 @@ impl Default for MonitorConfig {
             flow_rate_sigma_rad_s: 0.04,
             flow_smooth_s: 0.06,
             flow_sharp_m: 0.15,
-            flow_fastest_rad_s: 7.0,
-            flow_calm_rad_s: 1.0,
             flow_motion_m_s: 0.2,
             flow_agrees_s: 0.5,
             range_agrees_s: 1.0,

@@ -25,6 +25,9 @@ const WRONG_TILTS: f32 = 3.0;
 /// Shortest distance to the floor, m, over which a velocity is a rate of the picture.
 const LEAST_DISTANCE: f32 = 0.02;
 
+/// After so many intervals readings are missing.
+const MISSING: f32 = 3.0;
+
 /// A reading of the camera, as the estimator has compared it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowReading {
@@ -50,8 +53,9 @@ pub struct FlowReading {
     pub uncertain: f32,
     /// Square of the smoothed difference over that of its limit, the larger of both reckoners'.
     pub ratio: f32,
-    /// May reckoners be compared with at all? Not where the body turns too fast for the camera, the
-    /// accelerometer is shaken too hard or the distance is not measured.
+    /// May reckoners be compared with at all? Not where the accelerometer is shaken too hard, the
+    /// distance is not measured, or readings before this one are missing, as in a turn that the camera
+    /// does not follow.
     pub comparable: bool,
 }
 
@@ -204,8 +208,8 @@ pub(crate) struct Recollection {
     tested: u32,
     smooth: [[f32; 2]; 2],
     uncertain: f32,
-    /// The body turns faster than the camera follows, or did until now.
-    turns_fast: bool,
+    /// When the estimator compared a reading last.
+    compared: Option<Instant>,
 }
 
 impl Recollection {
@@ -272,6 +276,7 @@ impl Recollection {
     /// Takes the newest reading of the camera, if the estimator has compared one in this step.
     pub(crate) fn flow(
         &mut self,
+        now: Instant,
         config: &MonitorConfig,
         flow: Option<&FlowData>,
         estimate: &StateEstimate,
@@ -287,6 +292,7 @@ impl Recollection {
             return None;
         }
         let interval = flow.interval;
+        let gap = self.compared.replace(now).is_none_or(|last| now.since(last).seconds() > MISSING * interval);
         let raw = self.reckoners.turning();
         let turning = [raw.y, -raw.x];
         let [x, y] = status.flow_innovation;
@@ -299,9 +305,6 @@ impl Recollection {
         let rates = [flow.delta_x / interval, flow.delta_y / interval];
         let picture = square(rates[0]) + square(rates[1]) + square(turning[0]) + square(turning[1]);
         let change = self.reckoners.turning_change();
-        let fast = if self.turns_fast { config.flow_calm_rad_s } else { config.flow_fastest_rad_s };
-        let rate = raw - estimate.gyro_bias;
-        self.turns_fast = square(rate.x) + square(rate.y) > square(fast);
         let frames = square(config.flow_frame_share * distance) * picture;
         let late = square(config.flow_late_s * distance) * (square(change.x) + square(change.y));
         // It leaves the difference as it came in: of squares, twice as fast.
@@ -341,7 +344,7 @@ impl Recollection {
             smooth: self.smooth,
             uncertain: self.uncertain,
             ratio,
-            comparable: !self.turns_fast && self.shaken()[0] < SHAKEN && estimate.sensors.contains(SensorMask::TOF),
+            comparable: !gap && self.shaken()[0] < SHAKEN && estimate.sensors.contains(SensorMask::TOF),
         })
     }
 }

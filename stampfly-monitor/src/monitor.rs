@@ -139,7 +139,7 @@ impl Monitor {
 
         // The reading of the camera was compared with the estimate before this step's samples.
         let Self { config, recollection, vertical, .. } = self;
-        let mut flow = recollection.flow(config, input.flow.last().map(|sample| &sample.data), estimate, status);
+        let mut flow = recollection.flow(now, config, input.flow.last().map(|sample| &sample.data), estimate, status);
         if let Some(flow) = &mut flow {
             // Nothing is reckoned with what is not felt.
             flow.comparable &= input.felt;

@@ -20,6 +20,8 @@ const SILENT: f32 = 0.2;
 const JUMP: f32 = 0.15;
 /// One so far from its predecessor and from what is expected leaps, m: an outlier at first.
 const LEAP: f32 = 0.05;
+/// What the climb rate may be wrong by, in standard deviations, moves the range as well.
+const SIGMAS: f32 = 3.0;
 /// A reset that changes the height by less, m, has not moved the estimate: it falls by as much in a
 /// step of 2.5 ms at 4 m/s.
 const MOVED: f32 = 0.01;
@@ -186,8 +188,9 @@ impl Vertical {
         let moved = expected - self.expected;
         let change = math::smaller((distance - self.distance).abs(), (distance - self.distance - moved).abs());
         let follows = silence.is_some_and(|silence| silence < SILENT);
-        let jumps = follows && change > JUMP;
-        let leaps = follows && change > LEAP && (distance - expected).abs() > LEAP;
+        let free = SIGMAS * status.climb_sigma * silence.unwrap_or(0.0);
+        let jumps = follows && change > JUMP + free;
+        let leaps = follows && change > LEAP + free && (distance - expected).abs() > LEAP;
         let repeats = distance.to_bits() == self.distance.to_bits();
         self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
         (self.distance, self.expected) = (distance, expected);

@@ -1,13 +1,11 @@
 //! Turns that move the picture faster than the camera follows.
 //!
-//! A PMW3901 follows 7.4 rad/s. Above that its readings are wrong by metres per second, until the
-//! vehicle hardly turns any more. Meanwhile the tilt rests on the gyro alone.
+//! Above [`flow_max_rate`](crate::EskfConfig::flow_max_rate) its readings are wrong by metres per
+//! second, until the vehicle hardly turns any more. Meanwhile the tilt rests on the gyro alone.
 
 use stampfly_types::math;
 
-/// Rate at which a fast turn starts, rad/s.
-const FAST: f32 = 7.0;
-/// It ends when the rate has stayed below `CALM`, rad/s, for `SETTLES`, s.
+/// A fast turn ends when the rate has stayed below `CALM`, rad/s, for `SETTLES`, s.
 const CALM: f32 = 1.0;
 const SETTLES: f32 = 0.1;
 
@@ -33,11 +31,12 @@ pub(super) struct FastTurn {
 }
 
 impl FastTurn {
-    /// Takes the rates about body x and y, rad/s, over the interval of a reading, s.
+    /// Takes the rates about body x and y, rad/s, over the interval of a reading, s. A fast turn begins
+    /// at the rate `fastest`.
     #[inline]
-    pub(super) fn step(&mut self, [x, y]: [f32; 2], interval: f32) -> Turn {
+    pub(super) fn step(&mut self, [x, y]: [f32; 2], interval: f32, fastest: f32) -> Turn {
         let square = x * x + y * y;
-        let limit = if self.settles > 0.0 { CALM } else { FAST };
+        let limit = if self.settles > 0.0 { CALM } else { fastest };
         let fast = square > limit * limit;
         self.settles = if fast { SETTLES } else { math::larger(self.settles - interval, 0.0) };
         if self.settles > 0.0 {
@@ -56,13 +55,13 @@ mod tests {
     #[test]
     fn a_flip_is_over_when_the_vehicle_has_been_calm() {
         let mut turn = FastTurn::default();
-        assert_eq!(turn.step([5.0, 3.0], 0.01), Turn::Slow);
-        assert!((0..50).all(|_| turn.step([12.0, 0.0], 0.01) == Turn::Fast));
+        assert_eq!(turn.step([5.0, 3.0], 0.01, 7.0), Turn::Slow);
+        assert!((0..50).all(|_| turn.step([12.0, 0.0], 0.01, 7.0) == Turn::Fast));
         // It brakes: slower than the camera follows, and not yet calm.
-        assert_eq!(turn.step([3.0, 0.0], 0.01), Turn::Fast);
-        let calm = (0..20).map(|_| turn.step([0.1, 0.0], 0.01)).find(|turn| *turn != Turn::Fast);
+        assert_eq!(turn.step([3.0, 0.0], 0.01, 7.0), Turn::Fast);
+        let calm = (0..20).map(|_| turn.step([0.1, 0.0], 0.01, 7.0)).find(|turn| *turn != Turn::Fast);
         let Some(Turn::Over(angle)) = calm else { panic!("{calm:?}") };
         assert!((angle - 6.0).abs() < 0.1, "{angle} rad");
-        assert_eq!(turn.step([0.1, 0.0], 0.01), Turn::Slow);
+        assert_eq!(turn.step([0.1, 0.0], 0.01, 7.0), Turn::Slow);
     }
 }

@@ -51,20 +51,25 @@ impl Eskf {
         if cos_tilt < self.config.min_cos_tilt {
             return Err(Refusal::Tilt);
         }
+        let below = tof.distance * cos_tilt;
+        let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
+        if self.anchor.is_none() && self.range_gate.is_window(tof.distance, expected) {
+            return Err(Refusal::Range);
+        }
         if let Some(tested) = self.status.tested.get_mut(Counter::Tof as usize) {
             *tested = tested.wrapping_add(1);
         }
-        let below = tof.distance * cos_tilt;
         if let Some(anchor) = self.anchor {
             // Stationary: the range measures the surface below the sensor, not the height of the vehicle.
             let measured = anchor.z + below;
             self.surface = Some(self.surface.map_or(measured, |surface| surface + 0.1 * (measured - surface)));
+            self.range_gate.stand(tof.distance);
             self.gates.accept(Sensor::Tof, self.now);
             self.unconfirmed = 0.0;
             return Ok(Fusion::Fused { ratio: 0.0 });
         }
-        let expected = self.surface.map_or(tof.distance, |surface| (surface - delayed.state.position.z) / cos_tilt);
-        let use_as = self.range_gate.step(self.now, tof.distance, expected, self.gates.is_rejected(Sensor::Tof));
+        let (climb_sigma, rejecting) = (self.sigma(VELOCITY + 2), self.gates.is_rejected(Sensor::Tof));
+        let use_as = self.range_gate.step(self.now, tof.distance, expected, climb_sigma, rejecting);
         if use_as == Use::Ignore || self.findings.range.is_left_out() {
             return Err(Refusal::Implausible);
         }
@@ -153,12 +158,10 @@ impl Eskf {
         // Flow measures two axes of the body's; along the beam the velocity is the estimated one.
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
-        if let Some(tested) = self.status.tested.get_mut(Counter::Flow as usize) {
-            *tested = tested.wrapping_add(1);
-        }
         if self.anchor.is_none() {
+            let fastest = self.config.flow_max_rate;
             // Of the vehicle itself: a zero that has moved turns nothing.
-            match self.fast_turn.step([turning.x, turning.y], flow.interval) {
+            match self.fast_turn.step([turning.x, turning.y], flow.interval, fastest) {
                 Turn::Slow => {}
                 Turn::Fast => return Err(Refusal::Range),
                 Turn::Over(angle) => {
@@ -167,6 +170,15 @@ impl Eskf {
                     return Err(Refusal::Range);
                 }
             }
+            let picture = [rows[0].predicted / distance + raw.y, rows[1].predicted / distance - raw.x];
+            let exceeds = |[x, y]: [f32; 2], limit: f32| x * x + y * y > limit * limit;
+            // A picture that hardly moves contradicts an estimate that is fast: that is for the gate.
+            if exceeds(rate, fastest) || exceeds(picture, fastest) && exceeds(rate, 0.5 * fastest) {
+                return Err(Refusal::Range);
+            }
+        }
+        if let Some(tested) = self.status.tested.get_mut(Counter::Flow as usize) {
+            *tested = tested.wrapping_add(1);
         }
         if self.findings.flow.is_left_out() {
             return Err(Refusal::Implausible);

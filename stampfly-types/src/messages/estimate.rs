@@ -113,6 +113,8 @@ message! {
         acceleration_sigma: f32 ["m/s^2"],
         /// One standard deviation of the horizontal velocity, the larger of both axes'.
         velocity_sigma: f32 ["m/s"],
+        /// One standard deviation of the climb rate.
+        climb_sigma: f32 ["m/s"],
         /// One standard deviation of the gyro's bias about roll and pitch, the larger of both.
         gyro_bias_sigma: f32 ["rad/s"],
         /// The same about yaw.
