@@ -90,7 +90,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
     "button.hold.pair" [1.0, 4.0] "s" button.hold_pair => "a press this long pairs";
     "button.hold.reset" [4.5, 20.0] "s" button.hold_reset => "a press this long restarts";
 
-    "monitor.without" [0.0, 8191.0] "1" monitor.without => "hypotheses about sensors that are not asked, a bit each";
+    "monitor.without" [0.0, 4095.0] "1" monitor.without => "hypotheses about sensors that are not asked, a bit each";
 
     "failsafe.impact.flying" [20.0, 150.0] "m/s^2" failsafe.impact => "specific force of an impact";
     "failsafe.impact.landing" [20.0, 150.0] "m/s^2" failsafe.landing_impact => "specific force of an impact while landing";

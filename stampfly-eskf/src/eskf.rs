@@ -165,8 +165,6 @@ pub struct Eskf {
     range_gate: RangeGate,
     /// When a range was compared last.
     range_used: Instant,
-    /// Part of the height, upwards, which nothing but the air pressure shows, m.
-    unconfirmed: f32,
     fast_turn: FastTurn,
     findings: SensorFindings,
     history: History,
@@ -232,7 +230,6 @@ impl Eskf {
             findings: SensorFindings::default(),
             range_gate: RangeGate::default(),
             range_used: Instant::ZERO,
-            unconfirmed: 0.0,
             status: EstimatorStatus::default(),
             alignment: Alignment::KNOWN,
             aiding_timeout: Duration::from_seconds(config.aiding_timeout),
@@ -285,7 +282,6 @@ impl Eskf {
             findings,
             range_gate,
             range_used,
-            unconfirmed,
             status,
             alignment,
             aiding_timeout,
@@ -322,7 +318,6 @@ impl Eskf {
         *findings = SensorFindings::default();
         *range_gate = RangeGate::default();
         *range_used = Instant::ZERO;
-        *unconfirmed = 0.0;
         *status = EstimatorStatus::default();
         *alignment = Alignment::KNOWN;
         *aiding_timeout = Duration::from_seconds(config.aiding_timeout);

@@ -265,7 +265,9 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             level && (state.lands_next || lands(config, state, facts))
         }
         Event::TakeOffComplete => {
-            facts.takeoff_complete || (state.mode.is_manual() && facts.contact == GroundContact::Air)
+            // In a manual mode when its legs are free.
+            let rises = facts.known_height().is_none_or(|height| height > config.standing_height);
+            facts.takeoff_complete || (state.mode.is_manual() && facts.contact == GroundContact::Air && rises)
         }
         Event::TakeOff => {
             let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;

@@ -8,7 +8,7 @@
 //! | `STRUCK` | a blow from above on a vehicle that is upright | disarmed |
 //! | `GYRO_ANOMALY` | ‖gyro‖ above 800 °/s, 1800 °/s while it turns over, in two samples running, in four that follow from each other when they may be garbage | disarmed |
 //! | `TUMBLED` | tilt above 60° for 300 ms; above 75° while armed on the ground, above 40°, for 20 ms while taking off; for as long below 0.08 m, turning to 14° from how it stood within 50 ms, while taking off or landing; in ACRO and while it turns over above 120° for a second | disarmed |
-//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch, as far as the motors can make it, that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.45 of it, for 0.1 s | disarmed |
+//! | `MOTOR_WEAK` | in the air, a torque about roll and pitch, as far as the motors can make it, that is 0.3 of what one rotor's share of the weight makes above the usual one, or 0.75 of it, for 0.1 s | disarmed |
 //! | `MOTOR_LOST` | in the air, such a torque about roll and about pitch that is more than one rotor's share of the weight makes, for 0.1 s | disarmed |
 //! | `MOTOR_RUNS` | disarmed, and the battery's low-passed current is one that only a motor takes | with less, or armed |
 //! | `NO_LIFT` | taking off, below 0.08 m, a thrust of 1.1 of the weight is asked for, and 0.1 of the weight more than the specific force shows, for 2 s; flying, the motors get all there is, make less than 1.2 of the weight, and it does not climb, for 3 s | disarmed |

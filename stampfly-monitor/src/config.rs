@@ -22,6 +22,8 @@ pub struct MonitorConfig {
     /// Standard deviation of the accelerometer's zero along a horizontal axis, m/s², beside what the
     /// estimator says of its acceleration: what it moves by within seconds.
     pub accel_sigma_m_s2: f32,
+    /// Full scale of the accelerometer, m/s²: what has been near it may have been more.
+    pub accel_full_scale_m_s2: f32,
     /// Share of the accelerometer's root mean square change from sample to sample by which its mean is
     /// wrong: of 4 m/s², as recorded, 0.06 m/s².
     pub vibration_share: f32,
@@ -94,6 +96,7 @@ impl Default for MonitorConfig {
             lasts_s: 0.1,
             velocity_sigma_m_s: 0.09,
             accel_sigma_m_s2: 0.02,
+            accel_full_scale_m_s2: 78.5,
             vibration_share: 0.015,
             gyro_scale: 0.01,
             flow_scale: 0.12,

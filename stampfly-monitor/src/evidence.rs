@@ -25,6 +25,8 @@ const WRONG_TILTS: f32 = 3.0;
 /// Shortest distance to the floor, m, over which a velocity is a rate of the picture.
 const LEAST_DISTANCE: f32 = 0.02;
 
+/// Share of the full scale from which on a force may have been larger.
+const CLIPS: f32 = 0.9;
 /// After so many intervals readings are missing.
 const MISSING: f32 = 3.0;
 
@@ -85,10 +87,6 @@ pub struct Evidence<'a> {
     pub altimeter: &'a Altimeter,
     /// A range that came in this step.
     pub range: Option<RangeReading>,
-    /// The estimator has rejected the last one.
-    pub range_is_rejected: bool,
-    /// None has been used for a fifth of a second.
-    pub range_is_silent: bool,
     /// The range is not left out.
     pub trusts_range: bool,
     /// The vehicle has a range finder and a barometer, and feels its acceleration.
@@ -152,12 +150,8 @@ impl Evidence<'_> {
     }
 
     /// What takes height and climb rate back to the altimeter's, if ranges have misled the estimate.
-    /// `apart`: how much higher it is by the barometer alone, m, where that is known.
-    pub(crate) fn back_to_altimeter(&self, apart: Option<f32>) -> Option<EstimateCorrection> {
+    pub(crate) fn back_to_altimeter(&self) -> Option<EstimateCorrection> {
         let altimeter = self.altimeter;
-        if let Some(higher) = apart {
-            return Some(EstimateCorrection { unconfirmed: higher, ..self.climbs(higher, altimeter.climb) });
-        }
         if self.moved == 0.0 {
             return None;
         }
@@ -244,7 +238,7 @@ impl Recollection {
                 yaw_bias: status.yaw_bias_sigma,
             }
         };
-        match self.reckoners.step(samples, estimate, sigmas, stands) {
+        match self.reckoners.step(samples, CLIPS * config.accel_full_scale_m_s2, estimate, sigmas, stands) {
             Restart::Neither => {}
             Restart::One(index) => self.began_anew(index),
             Restart::Both => self.forget(),

@@ -87,7 +87,6 @@ hypotheses! {
     range_stuck: RangeStuck,
     range_outliers: RangeOutliers,
     range_jumped: RangeJumped,
-    range_drifts: RangeDrifts,
     range_wrapped: RangeWrapped,
 }
 
@@ -165,8 +164,6 @@ impl Monitor {
             flow,
             altimeter: &vertical.altimeter,
             range,
-            range_is_rejected: vertical.rejecting,
-            range_is_silent: vertical.is_silent(),
             trusts_range: trusted.range,
             has_range: input.felt && vertical.has_range() && vertical.altimeter.has_zero(),
             altitude,
@@ -303,7 +300,6 @@ fn both(first: &EstimateCorrection, second: &EstimateCorrection) -> EstimateCorr
         turn: first.turn + second.turn,
         velocity: first.velocity + second.velocity,
         down: first.down + second.down,
-        unconfirmed: first.unconfirmed + second.unconfirmed,
         gyro_bias: first.gyro_bias + second.gyro_bias,
         accel_bias: first.accel_bias + second.accel_bias,
         tilt_sigma: math::larger(first.tilt_sigma, second.tilt_sigma),

@@ -6,7 +6,8 @@
 //! is older than [`HALF`] from then on, and none older than twice that. A sensor that goes wrong is
 //! therefore compared with a state from before, for [`HALF`] at least.
 //!
-//! On a vehicle that stands both begin anew all the time.
+//! On a vehicle that stands both begin anew all the time, and after a gap in the samples or a blow that
+//! the accelerometer may not have measured whole.
 
 use crate::config::MonitorConfig;
 use stampfly_types::messages::{ImuData, StateEstimate};
@@ -210,10 +211,12 @@ impl Reckoners {
         (self.older, self.has_begun) = (1, true);
     }
 
-    /// Takes inertial samples and the estimate that followed from them, which is so uncertain.
+    /// Takes inertial samples and the estimate that followed from them, which is so uncertain. A force
+    /// beyond `clips` along any axis, m/s², may have been larger than it reads.
     pub fn step(
         &mut self,
         samples: &[Stamped<ImuData>],
+        clips: f32,
         estimate: &StateEstimate,
         sigmas: impl Fn() -> Sigmas,
         stands: bool,
@@ -227,6 +230,7 @@ impl Reckoners {
             if !(data.accel.norm_squared() + data.gyro.norm_squared()).is_finite() {
                 continue;
             }
+            gap |= data.accel.iter().any(|force| force.abs() > clips);
             self.elapsed += dt;
             self.rate += data.gyro * dt;
             self.force += data.accel * dt;
@@ -286,7 +290,7 @@ mod tests {
         for n in 1..=(seconds / DT) as u64 {
             let time = n as f32 * DT;
             let imu = Stamped { at: Instant::from_micros(n * 2_500), generation: 1, data: sample(time) };
-            let restart = reckoners.step(&[imu], &estimate(time), || SIGMAS, false);
+            let restart = reckoners.step(&[imu], f32::MAX, &estimate(time), || SIGMAS, false);
             restarts += u32::from(matches!(restart, Restart::One(_)));
         }
         restarts

@@ -78,10 +78,6 @@ pub(crate) struct Vertical {
     repeats: u32,
     /// When the estimator rejected one last.
     rejected: Option<Instant>,
-    /// It rejected the last one.
-    pub(crate) rejecting: bool,
-    /// Since a range was used, s.
-    unused: f32,
     /// How far the height was moved lately, upwards, m, and how often height or surface were.
     pub(crate) moved: f32,
     pub(crate) moves: u32,
@@ -91,11 +87,6 @@ pub(crate) struct Vertical {
 impl Vertical {
     pub(crate) fn airborne() -> Self {
         Self { altimeter: Altimeter::airborne(), ..Self::default() }
-    }
-
-    /// Has no range been used lately?
-    pub(crate) fn is_silent(&self) -> bool {
-        self.unused > SILENT
     }
 
     /// Is there a range finder at all?
@@ -139,7 +130,6 @@ impl Vertical {
             return None;
         }
         let (dt, force) = (core::mem::take(&mut self.elapsed), core::mem::take(&mut self.force));
-        self.unused += dt;
         let up = -estimate.attitude.transform_vector(&force).z - GRAVITY * dt;
         if self.baro_at.is_some_and(|at| now.since(at).seconds() > NO_ALTITUDE) {
             // The accelerometer alone drifts away.
@@ -194,14 +184,12 @@ impl Vertical {
         let repeats = distance.to_bits() == self.distance.to_bits();
         self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
         (self.distance, self.expected) = (distance, expected);
-        self.rejecting = refused != status.refused[RANGE];
-        if self.rejecting {
+        let rejected = refused != status.refused[RANGE];
+        if rejected {
             self.rejected = Some(at);
-        } else {
-            self.unused = 0.0;
         }
         let dt = math::smaller(silence.unwrap_or(0.0), LONGEST);
-        Some(RangeReading { distance, expected, dt, jumps, leaps, repeats: self.repeats, rejected: self.rejecting })
+        Some(RangeReading { distance, expected, dt, jumps, leaps, repeats: self.repeats, rejected })
     }
 
     /// Takes the newest altitude.

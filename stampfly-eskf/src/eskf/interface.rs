@@ -265,9 +265,6 @@ impl Estimator for Eskf {
 
     fn heed(&mut self, _at: Instant, findings: &SensorFindings) {
         self.findings = *findings;
-        if !findings.range.is_left_out() {
-            self.unconfirmed = 0.0;
-        }
     }
 
     fn correct(&mut self, _at: Instant, correction: &EstimateCorrection) {

@@ -72,8 +72,7 @@ impl Eskf {
     pub(super) fn correct_by(&mut self, correction: &EstimateCorrection) {
         let EstimateCorrection { turn, velocity, down, gyro_bias, accel_bias, .. } = correction;
         let numbers = [turn, velocity, gyro_bias, accel_bias].map(Vec3::norm_squared);
-        if !self.initialized || !numbers.into_iter().all(f32::is_finite) || !(down + correction.unconfirmed).is_finite()
-        {
+        if !self.initialized || !numbers.into_iter().all(f32::is_finite) || !down.is_finite() {
             return;
         }
         let (sin, cos) = math::sin_cos(0.5 * turn.norm());
@@ -87,7 +86,6 @@ impl Eskf {
         self.calibration.gyro_bias = self.state.gyro_bias;
         let square = |sigma: f32| if sigma.is_finite() { sigma * sigma } else { 0.0 };
         if correction.climb_sigma > 0.0 {
-            self.unconfirmed = correction.unconfirmed;
             self.covariance.reset(VELOCITY + 2, square(correction.climb_sigma));
             self.covariance.inflate(POSITION + 2, 0.1);
             self.covariance.reset(ACCEL_BIAS + 2, 0.1);

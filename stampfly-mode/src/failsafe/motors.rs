@@ -25,10 +25,10 @@ use stampfly_types::{Duration, Instant, math};
 const WEIGHT: f32 = 0.05;
 /// The same for what is usual: 3 s, which a weakness of a tenth of a second does not move.
 const USUAL: f32 = 0.0008;
-/// What is usual may be this many times as large as what becomes so: two thirds of a rotor's share
-/// of the weight. A centre of mass that lies a sixth of the rotors' distance aside, about both
-/// axes, asks for as much: 3.8 mm of a StampFly's 23.
-const STANDING: f32 = 2.2;
+/// What is usual may be this many times as large as what becomes so: three quarters of a rotor's share
+/// of the weight. A centre of mass 3 mm aside of a StampFly's 23 about both axes asks for 0.52 of it,
+/// and rotors that differ by an eighth for 0.18.
+const STANDING: f32 = 2.5;
 /// A motor is lost from this many times a weak one's torque on: a rotor's share of the weight.
 const LOST: f32 = 1.0 / WEAK_SHARE;
 

@@ -367,7 +367,7 @@ fn a_motor_that_becomes_weak_is_found_and_a_load_that_lies_askew_is_not() {
     assert!(!is_weak([0.0, 0.0], [4.0, 0.5], 400), "about one axis");
     assert!(!is_weak([0.9, 0.9], [1.2, 1.2], 400), "askew all the time");
     assert!(is_weak([0.4, 0.4], [-1.4, 1.6], 80), "beyond what is usual");
-    assert!(is_weak([2.4, 2.4], [2.4, 2.4], 10), "weak from the take-off on");
+    assert!(is_weak([2.6, 2.6], [2.6, 2.6], 10), "weak from the take-off on");
 }
 
 /// What stands leans on the ground, and a landing is what would follow.

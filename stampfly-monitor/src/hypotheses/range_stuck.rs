@@ -57,6 +57,6 @@ impl Hypothesis for RangeStuck {
             || range.repeats >= AFTER_JUMP && self.jumped
             || range.repeats >= ALWAYS + self.stood
             || range.repeats >= FROM_GROUND;
-        if stuck { Opinion::Holds(seen.back_to_altimeter(None)) } else { Opinion::Unknown }
+        if stuck { Opinion::Holds(seen.back_to_altimeter()) } else { Opinion::Unknown }
     }
 }

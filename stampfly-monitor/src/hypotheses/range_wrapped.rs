@@ -2,7 +2,7 @@
 //!
 //! A range that wraps below the height of a leg says for the whole of a take-off that the vehicle has
 //! hardly left the floor, and the controller pushes until it flies seven metres higher.
-//! [`range_drifts`](super::range_drifts) does not look at the barometer that soon, because propellers
+//! The barometer shows it late, because propellers
 //! that start change the pressure, and the more the nearer the floor is: by up to 0.6 m, in either
 //! direction. So does a door, by 1.5 m within a second. What tells a climb from a door is that it is
 //! felt: of the climb rate that the estimate does not have, the accelerometer has gained a share.

@@ -66,9 +66,6 @@ message! {
         velocity: Vec3 ["m/s"],
         /// World down.
         down: f32 ["m"],
-        /// Part of that height, upwards, which nothing but the air pressure shows: no distance to the
-        /// floor for a camera.
-        unconfirmed: f32 ["m"],
         /// Body FRD.
         gyro_bias: Vec3 ["rad/s"],
         /// Body FRD.

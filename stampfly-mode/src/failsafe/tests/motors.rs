@@ -102,9 +102,9 @@ fn a_torque_that_was_asked_for_from_the_ground_on_is_a_weak_motor_from_more_than
         (rig.mode.phase, rig.estimate.height) = (FlightPhase::Flying, 1.0);
         found(&mut rig, torque, 400, Alerts::MOTOR_WEAK)
     };
-    assert_eq!(weak([2.3, -2.3]), Some(41), "after 0.1 s");
-    assert_eq!(weak([2.1, 2.1]), None);
-    assert_eq!(weak([3.0, 2.1]), None, "about one axis");
+    assert_eq!(weak([2.6, -2.6]), Some(41), "after 0.1 s");
+    assert_eq!(weak([2.4, 2.4]), None);
+    assert_eq!(weak([3.0, 2.4]), None, "about one axis");
 }
 
 /// Samples until a motor counts as running, of so many; bursts of a sample ten times a second add to the current, A.
