@@ -78,6 +78,8 @@ const COVARIANCE_STEP: f32 = 9e-3;
 const BRAKES: f32 = 1.5;
 /// Below this height, m, the ground may carry it, and what it feels is no drag: it comes down level.
 const LEVEL: f32 = 0.12;
+/// A take-off is over after this time: at 0.03 m/s it has risen to where a camera sees.
+const RISES: Duration = Duration::from_secs(3);
 /// Pseudo-measurements are made on every n-th inertial sample.
 const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
@@ -165,6 +167,8 @@ pub struct Eskf {
     range_gate: RangeGate,
     /// When a range was compared last.
     range_used: Instant,
+    /// When it last left the ground.
+    stood: Option<Instant>,
     fast_turn: FastTurn,
     findings: SensorFindings,
     history: History,
@@ -230,6 +234,7 @@ impl Eskf {
             findings: SensorFindings::default(),
             range_gate: RangeGate::default(),
             range_used: Instant::ZERO,
+            stood: None,
             status: EstimatorStatus::default(),
             alignment: Alignment::KNOWN,
             aiding_timeout: Duration::from_seconds(config.aiding_timeout),
@@ -282,6 +287,7 @@ impl Eskf {
             findings,
             range_gate,
             range_used,
+            stood,
             status,
             alignment,
             aiding_timeout,
@@ -318,6 +324,7 @@ impl Eskf {
         *findings = SensorFindings::default();
         *range_gate = RangeGate::default();
         *range_used = Instant::ZERO;
+        *stood = None;
         *status = EstimatorStatus::default();
         *alignment = Alignment::KNOWN;
         *aiding_timeout = Duration::from_seconds(config.aiding_timeout);
@@ -486,6 +493,12 @@ impl Eskf {
     fn is_velocity_aided(&self) -> bool {
         let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.findings.flow.is_left_out();
         self.anchor.is_some() || flow || self.is_aided_outside(Sensor::Level)
+    }
+
+    /// Has it left the ground, where it stood still, so lately that it knows its velocity without a
+    /// camera? That sees nothing of the first centimetres.
+    fn has_just_risen(&self) -> bool {
+        self.stood.is_some_and(|stood| self.now.since(stood) < RISES) && !self.findings.flow.is_left_out()
     }
 
     /// Says in the status how uncertain motion and gyro are.

@@ -342,6 +342,19 @@ mod tests {
     }
 
     #[test]
+    fn a_blow_that_clips_is_not_reckoned_with() {
+        let mut reckoners = Reckoners::default();
+        reckoners.begin(&StateEstimate::default(), SIGMAS, true);
+        let blow = |force: f32| ImuData { accel: Vec3::new(force, 0.0, -GRAVITY), ..ImuData::default() };
+        for n in 1..=200u64 {
+            let imu = blow(if (100..104).contains(&n) { 77.0 } else { 0.0 });
+            let imu = Stamped { at: Instant::from_micros(n * 2_500), generation: 1, data: imu };
+            reckoners.step(&[imu], 70.0, &StateEstimate::default(), || SIGMAS, false);
+        }
+        assert!(reckoners.get(0).velocity.norm() < 0.01 && reckoners.get(0).age < 0.3, "{:?}", reckoners.get(0));
+    }
+
+    #[test]
     fn samples_that_are_no_numbers_and_gaps_do_no_harm() {
         let mut reckoners = Reckoners::default();
         reckoners.begin(&StateEstimate::default(), SIGMAS, true);

@@ -62,6 +62,8 @@ const STEPS: &[Step] = &[
         .after(&["program"])
         .accepting(&[Fix]),
     Step::ci("faults", "Fly two hundred flights with faults", steps::campaign::some).after(&["program"]),
+    Step::ci("envelope", "Fly four hundred sound vehicles through the whole envelope", steps::envelope::some)
+        .after(&["program"]),
     Step::ci("docs", "Check links, pictures and generated tables of the documents", steps::docs::run)
         .after(&["program"])
         .accepting(&[Fix]),
@@ -150,6 +152,9 @@ const STEPS: &[Step] = &[
         steps::campaign::all,
     )
     .holding(&[Machine]),
+    Step::nightly("envelope-all", "Fly five thousand sound vehicles through the whole envelope", steps::envelope::all)
+        .holding(&[Machine])
+        .accepting(&[Fix]),
     Step::nightly("bars", "Fly a hundred missions and hold them to their limits", steps::bars::run).holding(&[Machine]),
     Step::nightly("peers", "Measure the estimator beside other crates", steps::peers::run)
         .holding(&[Machine])

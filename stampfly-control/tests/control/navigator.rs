@@ -294,6 +294,20 @@ fn a_vehicle_below_a_ceiling_lands_from_where_it_is() {
 }
 
 #[test]
+fn a_landing_that_finds_itself_lower_goes_on_from_there() {
+    let mut bench = Bench::aloft();
+    bench.enter(FlightPhase::Landing);
+    bench.run(0.5);
+    // A range comes back, and shows that it is lower by more than a metre.
+    bench.estimate.position.z += 1.3;
+    let height = bench.estimate.position.z;
+    for _ in 0..400 {
+        let setpoint = bench.step();
+        assert!(setpoint.position.z >= height - 0.25 - 1e-4 && setpoint.velocity.z >= 0.0, "{setpoint:?}");
+    }
+}
+
+#[test]
 fn landing_sinks_as_told_and_does_not_dig() {
     let mut bench = Bench::aloft();
     let place = bench.setpoint.position.horizontal();

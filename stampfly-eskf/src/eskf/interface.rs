@@ -74,6 +74,7 @@ impl Estimator for Eskf {
                 // Blind on the ground: the surface is one clearance below.
                 self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
                 self.anchor = None;
+                self.stood = Some(self.now);
                 let vibration = self.config.vibration_bias;
                 self.covariance.inflate(ACCEL_BIAS + 2, vibration * vibration);
                 if let Some(offset) = &mut self.baro_offset {
@@ -223,7 +224,7 @@ impl Estimator for Eskf {
         // Not what aids from inside: an airspeed, a model of wheels.
         let outside = [Sensor::Position, Sensor::Velocity, Sensor::Attitude].into_iter().any(recent);
         let north = self.is_north_known();
-        let horizontal = sound && north && self.is_velocity_aided();
+        let horizontal = sound && north && (self.is_velocity_aided() || self.has_just_risen());
         let drifts = horizontal || (sound && self.feels_drag() && self.is_velocity_certain() && self.height() > LEVEL);
         let baro = air && !self.findings.baro.is_left_out();
         let vertical = sound && (range || baro || down || stationary);

@@ -40,8 +40,8 @@ struct Means {
     /// Largest square of what single readings of each may be wrong by, (m/s)².
     uncertain: [f32; 3],
     readings: u32,
-    /// Where it has jumped from, m/s.
-    from: Option<[f32; 2]>,
+    /// Where it has jumped from, m/s, and what that was uncertain by, (m/s)².
+    from: Option<([f32; 2], f32)>,
     /// Age of the reckoner, s.
     age: f32,
     /// Its variance by noise when the last three means began, oldest first, (m/s)².
@@ -116,10 +116,10 @@ impl Means {
         let [_, last, now] = self.uncertain;
         self.uncertain = [last, now, 0.0];
         // Before the third mean there is nothing to compare with.
-        let before = self.from.or((self.readings >= 3 * BLOCK).then_some(first));
-        self.from = before.filter(|before| {
+        let before = self.from.or((self.readings >= 3 * BLOCK).then_some((first, uncertain)));
+        self.from = before.filter(|(before, was)| {
             let [x, y] = [mean[0] - before[0], mean[1] - before[1]];
-            x * x + y * y > limit * limit + uncertain
+            x * x + y * y > limit * limit + math::larger(*was, uncertain)
         });
     }
 }

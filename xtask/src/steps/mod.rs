@@ -16,6 +16,7 @@ pub mod demo;
 pub mod determinism;
 pub mod doc;
 pub mod docs;
+pub mod envelope;
 pub mod esp32;
 mod esp32_link;
 pub mod examples;

@@ -34,6 +34,10 @@ const MEAN: f32 = 1.0;
 const TOUCHED: Duration = Duration::from_millis(100);
 /// Longest way to the floor along the body's axis that the range finder measures, m: the chip's.
 const REACH: f32 = 4.0;
+/// The fastest picture that the camera follows, rad/s, and how near to the floor it works, m: the
+/// PMW3901's.
+const FASTEST_PICTURE: f32 = 7.0;
+const NEAREST_PICTURE: f32 = 0.08;
 /// A sensor that sees nothing is lost after a second, and was not out of its reach if it saw the
 /// floor for the last half of that.
 const IN_REACH: Duration = Duration::from_millis(500);
@@ -149,7 +153,9 @@ impl Soundness {
         let up = |attitude: &Quat| attitude.inverse() * Vec3::new(0.0, 0.0, -1.0);
         let cos_error = up(&truth.attitude).dot(&up(&self.estimate.attitude)).clamp(-1.0, 1.0);
         let cos_tilt = frame::cos_tilt(&truth.attitude);
-        if clearance > REACH * cos_tilt {
+        // Nor does the camera follow a faster picture, or a nearer one.
+        let nearest = math::larger(truth.velocity.horizontal().norm() / FASTEST_PICTURE, NEAREST_PICTURE);
+        if clearance > REACH * cos_tilt || !truth.contact && clearance < nearest {
             self.out_of_reach = Some(now);
         }
         let touched = self.touched.is_some_and(|touched| now.since(touched) <= TOUCHED);
