@@ -31,13 +31,8 @@ const LARGEST_FLOW: f32 = 10.0;
 const KNOWN_DISTANCE: f32 = 0.1;
 const KNOWN_SHARE: f32 = 0.5;
 
-/// A picture is one that the camera follows if it is so at all velocities within so many standard
-/// deviations. What is too fast it shows as slow, and as likely backwards.
-const MAY_BE: f32 = 3.0;
-/// An estimate knows its velocity for so long without flow.
-const RECKONED: Duration = Duration::from_secs(3);
-/// A rate of the picture becomes a velocity by the distance: from here on, m.
-const NEAREST: f32 = 0.01;
+/// A hand moves a vehicle so slowly that its camera sees it from here on, m.
+const NEAREST: f32 = 0.02;
 /// What flow does not correct: height, climb rate and the zero that moves them. A leaning camera sees a part of the climb. Where no range
 /// holds it, at the first instant of a take-off or after a reset, it is so uncertain that a wrong distance, or a leg that
 /// slips, would become climb. How uncertain it is still counts.
@@ -132,7 +127,7 @@ impl Eskf {
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
-        let nearest = if self.anchor.is_some() { NEAREST } else { self.config.flow_min_distance };
+        let nearest = if self.command.flying { self.config.flow_min_distance } else { NEAREST };
         if distance < nearest {
             return Err(Refusal::Range);
         }
@@ -179,12 +174,9 @@ impl Eskf {
             }
             let length = |[x, y]: [f32; 2]| math::sqrt(x * x + y * y);
             let picture = length([rows[0].predicted / distance + raw.y, rows[1].predicted / distance - raw.x]);
-            let (rate, spread) = (length(rate), MAY_BE * self.larger_sigma(VELOCITY) / distance);
-            let knows = self.gates.is_recent_within(Sensor::Flow, self.now, RECKONED);
-            // A picture that hardly moves contradicts an estimate that is fast: that is for the gate.
-            let too_fast = rate > fastest || picture > fastest && rate > 0.5 * fastest;
-            let may_be = picture <= fastest && picture + spread > fastest && knows;
-            if too_fast || may_be {
+            // What contradicts the estimate by more is for the gate.
+            let [slower, faster] = [math::smaller(length(rate), picture), math::larger(length(rate), picture)];
+            if self.command.flying && faster > fastest && slower > 0.5 * fastest {
                 return Err(Refusal::Range);
             }
         }

@@ -182,7 +182,9 @@ fn a_range_that_lies_from_the_take_off_on_does_not_carry_the_vehicle_away() {
     for fault in ["tof-stuck@ground", "tof-stuck@takeoff", "tof-alias@ground", "tof-alias@hover", "tof-outliers@spool"]
     {
         let judgement = flown(&setup("arm\ntakeoff 0.5\nhover 2\ngoto 1 0 0.7\nland\n", &[fault])).0.judgement;
-        assert!(judgement.alerts.iter().any(|span| span.name == "RANGE_IMPLAUSIBLE"), "{fault}");
+        // Outliers at the distance where it stood are those of a smeared window, and left out.
+        let is_found = judgement.alerts.iter().any(|span| span.name == "RANGE_IMPLAUSIBLE");
+        assert!(is_found || fault.starts_with("tof-outliers"), "{fault}");
         assert!(judgement.as_expected && judgement.max_above_m < 0.8, "{fault}: {judgement:?}");
     }
 }

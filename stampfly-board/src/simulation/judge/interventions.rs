@@ -40,8 +40,6 @@ const UNKNOWN: Alerts = Alerts::RANGE_IMPLAUSIBLE
     .with(Alerts::ESTIMATE_DIVERGED);
 /// Of those, what is no news where no floor is in reach.
 const SEES_NOTHING: Alerts = Alerts::TOF_LOST.with(Alerts::FLOW_LOST);
-/// Alerts of a battery that does not carry the vehicle.
-const SPENT: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::NO_LIFT);
 /// The name of no alert.
 const NONE: &str = "NONE";
 
@@ -228,7 +226,7 @@ impl Interventions {
             tilt_deg: f64::from(state.tilt().to_degrees()),
             attitude_error_deg: f64::from(state.attitude_error().to_degrees()),
             by_protection: self.cut_off || self.alerts.intersects(CUT),
-            spent: action == "land" && !state.carried && self.alerts.intersects(SPENT),
+            spent: action == "land" && !state.carried,
         });
     }
 }

@@ -9,7 +9,7 @@ fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
     let mut held = None;
     let mut count = 0u32;
     vec![
-        ("low", Box::new(|_, tof: &mut TofData| (tof.distance, tof.valid) = (0.03, true)), 1.0, Some(1.0)),
+        ("low", Box::new(|_, tof: &mut TofData| (tof.distance, tof.valid) = (0.03, true)), 1.0, None),
         ("stuck", Box::new(move |_, tof: &mut TofData| *tof = *held.get_or_insert(*tof)), 1.0, Some(2.0)),
         ("half", Box::new(|_, tof: &mut TofData| tof.distance *= 0.5), 1.0, Some(0.5)),
         ("0.3 m too low", Box::new(|_, tof: &mut TofData| tof.distance -= 0.3), 1.0, Some(0.5)),
