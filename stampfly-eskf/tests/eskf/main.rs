@@ -4,6 +4,7 @@
 mod air;
 mod attitude;
 mod calibration;
+mod camera;
 mod consistency;
 mod huge_samples;
 mod mahony_vectors;

@@ -4,7 +4,8 @@ use super::*;
 
 type Lie = Box<dyn FnMut(f32, &mut TofData)>;
 
-/// Lies, how high the vehicle may get from its 0.5 m, m, and within how many seconds they must be found, if they can be.
+/// Lies, how high the vehicle may get from its 0.5 m, m, and within how many seconds they must be found, if they can be. What
+/// reads as where the vehicle stood is the sensor's window, and left out.
 fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
     let mut held = None;
     let mut count = 0u32;
@@ -23,7 +24,7 @@ fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
                 }
             }),
             1.0,
-            Some(1.0),
+            None,
         ),
         ("ramp", Box::new(|t, tof: &mut TofData| tof.distance = (tof.distance - 0.3 * t).max(0.02)), 3.5, Some(12.0)),
     ]

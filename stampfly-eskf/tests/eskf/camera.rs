@@ -1,0 +1,69 @@
+//! What a camera for optical flow does not see: a floor that is too near, and one that passes too fast.
+
+use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
+use stampfly_types::messages::{CalibrationResult, EstimateCorrection, EstimatorCommand, FlowData, ImuData, TofData};
+use stampfly_types::{GRAVITY, Instant, Vec3};
+
+/// A filter that has stood, and was then lifted to this height, m. Does it fly, or does a hand carry it?
+fn aloft(height: f32, flying: bool) -> (Eskf, Instant) {
+    let mut eskf = Eskf::new(EskfConfig::default());
+    let specific_force = Vec3::new(0.0, 0.0, -GRAVITY);
+    eskf.command(Instant::ZERO, &EstimatorCommand { on_ground: true, ..EstimatorCommand::default() });
+    eskf.initialize(
+        Instant::ZERO,
+        &CalibrationResult { specific_force, complete: true, ..CalibrationResult::default() },
+    );
+    let mut at = Instant::ZERO;
+    for step in 1..=2_000u64 {
+        at = Instant::from_micros(2_500 * step);
+        // What measures never repeats itself.
+        let dither = 1e-3 * ((step * 7_919 % 101) as f32 / 50.0 - 1.0);
+        eskf.predict(at, &ImuData { accel: specific_force, temperature: 25.0, ..ImuData::default() });
+        if step == 800 {
+            eskf.command(at, &EstimatorCommand { flying, ..EstimatorCommand::default() });
+        }
+        let risen = (step.saturating_sub(800) as f32 / 800.0).min(1.0);
+        if step.is_multiple_of(13) {
+            let distance = 0.03 + (height - 0.03) * risen + dither;
+            _ = eskf.fuse_tof(at, &TofData { distance, valid: true, ..TofData::default() });
+        }
+    }
+    (eskf, at)
+}
+
+/// A picture that moves by this rate about the body's y axis, rad/s.
+fn picture(rate: f32) -> FlowData {
+    FlowData { delta_x: 0.01 * rate, delta_y: 1e-5, interval: 0.01, quality: 100, valid: true }
+}
+
+#[test]
+fn a_floor_that_is_too_near_is_not_seen_in_flight() {
+    let fusion = |height: f32, flying: bool| {
+        let (mut eskf, at) = aloft(height, flying);
+        eskf.fuse_flow(at, &picture(0.01))
+    };
+    assert_eq!(fusion(0.05, true), Fusion::Refused(Refusal::Range));
+    assert!(!matches!(fusion(0.05, false), Fusion::Refused(_)), "a hand moves it slowly");
+    assert!(!matches!(fusion(0.3, true), Fusion::Refused(_)));
+}
+
+#[test]
+fn a_picture_that_is_faster_than_the_camera_follows_is_not_used() {
+    let fusion = |speed: f32, rate: f32| {
+        let (mut eskf, at) = aloft(0.3, true);
+        let velocity = Vec3::new(speed, 0.0, 0.0);
+        eskf.correct(at, &EstimateCorrection { velocity, velocity_sigma: 0.05, ..EstimateCorrection::default() });
+        // A correction empties the history: a reading that waits is compared with what comes after.
+        let mut now = at;
+        for step in 1..=20u64 {
+            now = Instant::from_micros(at.as_micros() + 2_500 * step);
+            let accel = Vec3::new(0.0, 0.0, -GRAVITY);
+            eskf.predict(now, &ImuData { accel, temperature: 25.0, ..ImuData::default() });
+        }
+        eskf.fuse_flow(now, &picture(rate))
+    };
+    // 3 m/s over 0.3 m are 10 rad/s, which it shows as something else.
+    assert_eq!(fusion(3.0, 6.9), Fusion::Refused(Refusal::Range));
+    assert!(!matches!(fusion(1.5, 5.0), Fusion::Refused(_)), "5 rad/s are seen");
+    assert!(!matches!(fusion(3.0, 0.5), Fusion::Refused(_)), "a contradiction is for the gate");
+}
