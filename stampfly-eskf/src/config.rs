@@ -67,8 +67,8 @@ pub struct EskfConfig {
     pub flow_delay: f32,
     /// Smallest surface quality used.
     pub flow_min_quality: u8,
-    /// Nearer to the floor, m, the picture of a vehicle that flies is blurred and shows nothing: a
-    /// PMW3901 works from 80 mm on.
+    /// Nearer to the floor, m, the picture is blurred: a PMW3901 works from 80 mm on. A take-off does
+    /// not use it.
     pub flow_min_distance: f32,
     /// Fastest motion of the picture that the camera follows, rad/s: 7.4 for a PMW3901. A faster one it
     /// shows as another.

@@ -167,6 +167,8 @@ pub struct Eskf {
     range_gate: RangeGate,
     /// When a range was compared last.
     range_used: Instant,
+    /// In this flight the floor was once far enough away to be seen sharply.
+    has_seen_floor: bool,
     /// When it last left the ground.
     stood: Option<Instant>,
     fast_turn: FastTurn,
@@ -234,6 +236,7 @@ impl Eskf {
             findings: SensorFindings::default(),
             range_gate: RangeGate::default(),
             range_used: Instant::ZERO,
+            has_seen_floor: false,
             stood: None,
             status: EstimatorStatus::default(),
             alignment: Alignment::KNOWN,
@@ -287,6 +290,7 @@ impl Eskf {
             findings,
             range_gate,
             range_used,
+            has_seen_floor,
             stood,
             status,
             alignment,
@@ -324,6 +328,7 @@ impl Eskf {
         *findings = SensorFindings::default();
         *range_gate = RangeGate::default();
         *range_used = Instant::ZERO;
+        *has_seen_floor = false;
         *stood = None;
         *status = EstimatorStatus::default();
         *alignment = Alignment::KNOWN;

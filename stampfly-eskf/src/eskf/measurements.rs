@@ -33,10 +33,10 @@ const KNOWN_SHARE: f32 = 0.5;
 
 /// A hand moves a vehicle so slowly that its camera sees it from here on, m.
 const NEAREST: f32 = 0.02;
-/// What flow does not correct: height, climb rate and the zero that moves them. A leaning camera sees a part of the climb. Where no range
-/// holds it, at the first instant of a take-off or after a reset, it is so uncertain that a wrong distance, or a leg that
-/// slips, would become climb. How uncertain it is still counts.
-/// In a hand nothing shakes the accelerometer, and what flow knows of the climb is worth having.
+/// Flow does not correct height, climb rate and the zero that moves them. A leaning camera sees a part
+/// of the climb. Where no range holds it, at the first instant of a take-off or after a reset, it is so
+/// uncertain that a wrong distance, or a leg that slips, would become climb. Its uncertainty still
+/// counts. In a hand nothing shakes the accelerometer, and what flow knows of the climb is worth having.
 const VERTICAL: [usize; 3] = [POSITION + 2, VELOCITY + 2, ACCEL_BIAS + 2];
 
 impl Eskf {
@@ -127,8 +127,12 @@ impl Eskf {
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
-        let nearest = if self.command.flying { self.config.flow_min_distance } else { NEAREST };
-        if distance < nearest {
+        // At a take-off a leg may slip while the picture is blurred. What has been seen before is known
+        // well enough for the last centimetres of a landing, and above a table.
+        self.has_seen_floor =
+            self.command.flying && (self.has_seen_floor || distance >= self.config.flow_min_distance);
+        let takes_off = self.command.flying && !self.has_seen_floor;
+        if distance < if takes_off { self.config.flow_min_distance } else { NEAREST } {
             return Err(Refusal::Range);
         }
         let uncertain = KNOWN_DISTANCE + KNOWN_SHARE * distance;
