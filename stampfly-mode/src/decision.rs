@@ -36,6 +36,9 @@ use stampfly_types::{Duration, Instant};
 pub const UNFELT: Alerts = Alerts::FORCE_IMPLAUSIBLE.with(Alerts::ACCEL_FAULTY);
 /// Cosine of the largest tilt, 15°, before and after turning over.
 const LEVEL: f32 = 0.966;
+/// A take-off in ACRO is over after this time, legs free or not: it levels itself, and to turn whatever
+/// holds the vehicle fills the integrals of its rate loops. A take-off frees its legs within a second.
+const LEVELS_ITSELF: Duration = Duration::from_secs(3);
 
 impl State {
     /// Is the vehicle so close to the ground that the motors may be stopped?
@@ -267,7 +270,9 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
         Event::TakeOffComplete => {
             // In a manual mode when its legs are free.
             let rises = facts.known_height().is_none_or(|height| height > config.standing_height);
-            facts.takeoff_complete || (state.mode.is_manual() && facts.contact == GroundContact::Air && rises)
+            facts.takeoff_complete
+                || (state.mode.is_manual() && facts.contact == GroundContact::Air && rises)
+                || (state.mode == FlightMode::Acro && waited(LEVELS_ITSELF))
         }
         Event::TakeOff => {
             let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;

@@ -90,7 +90,10 @@ impl Event {
                 "level and at rest again after it was upside down, or without that `flip_start` after it began; after `flip_timeout` \
                  in any case"
             }
-            Self::TakeOffComplete => "the land detector says so, or in a manual mode the vehicle has left the ground",
+            Self::TakeOffComplete => {
+                "the land detector says so, or in a manual mode the vehicle has left the ground, or in ACRO three \
+                 seconds have passed"
+            }
             Self::TakeOff => {
                 "`TakeOff`, the spool-up time after arming in a mode that holds height, or the pilot's throttle raised from \
                  rest"

@@ -41,10 +41,13 @@ pub struct RangeReading {
     pub jumps: bool,
     /// It is nearer to that, and just as far from what is expected.
     pub leaps: bool,
-    /// So many before it had the same value.
+    /// So many before it had the same value, compared or not.
     pub repeats: u32,
     /// The estimator has rejected it.
     pub rejected: bool,
+    /// The estimator has compared it with what it expects. Where it has not, as with a window that
+    /// reports itself, the reading may still be stuck.
+    pub compared: bool,
 }
 
 /// A block of inertial samples.

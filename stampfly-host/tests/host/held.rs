@@ -117,10 +117,8 @@ fn held_for_a_minute(mode: FlightMode, all: RangeInclusive<u64>, least: usize) {
         }
     }
     println!("{mode:?}: {worst:.1} deg after {flown} were let go; {stopped} had stopped their motors; {over:#?}");
-    // A hand that holds a leaning vehicle fills the integrals of the rate loops: one in twenty. In ACRO
-    // the sticks lean what stands, and nothing levels it when it is let go.
-    let share = if mode == FlightMode::Acro { 8 } else { 20 };
-    assert!(over.len() <= 1 + flown / share && worst < 45.0, "{mode:?}: {over:#?}");
+    // A hand that holds a leaning vehicle fills the integrals of the rate loops: one in twenty.
+    assert!(over.len() <= 1 + flown / 20 && worst < 45.0, "{mode:?}: {over:#?}");
     let is_enough = flown * all.count() >= least * seeds.count();
     assert!(is_enough, "{mode:?}: only {flown} were let go with their motors on");
 }

@@ -82,6 +82,18 @@ fn from_one_manual_mode_to_another_nothing_is_waited_for() {
 
 /// The switch is turned while the vehicle takes off: the mode comes when it flies.
 #[test]
+fn a_take_off_in_acro_is_over_after_three_seconds_though_a_hand_holds_the_vehicle() {
+    for (mode, phase) in [(FlightMode::Acro, FlightPhase::Flying), (FlightMode::Stabilize, FlightPhase::TakeOff)] {
+        let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
+        world.sends(&mut machine, frame(mode, false, 0.0));
+        world.sends(&mut machine, frame(mode, true, 0.0));
+        assert_eq!(world.sends(&mut machine, frame(mode, true, 0.3)).phase, FlightPhase::TakeOff);
+        assert_eq!(world.pass(&mut machine, 2_500).phase, FlightPhase::TakeOff);
+        assert_eq!(world.pass(&mut machine, 500).phase, phase, "{mode:?}");
+    }
+}
+
+#[test]
 fn a_manual_mode_chosen_on_the_way_up_waits_for_the_throttle_too() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);
     world.sends(&mut machine, frame(FlightMode::AltHold, false, 0.0));
