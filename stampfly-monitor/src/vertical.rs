@@ -75,6 +75,9 @@ pub(crate) struct Vertical {
     resets: u32,
     /// It has reset its state to the range in this step.
     reset: bool,
+    /// The last range, m.
+    newest: f32,
+    /// The last one that was compared, and what was expected of it, m.
     distance: f32,
     expected: f32,
     range_at: Option<Instant>,
@@ -160,7 +163,7 @@ impl Vertical {
         self.moves += u32::from(surface != 0.0 || moved != 0.0);
     }
 
-    /// Takes the newest range, if the estimator has looked at one in this step.
+    /// Takes the newest range.
     pub(crate) fn range(
         &mut self,
         at: Instant,
@@ -171,9 +174,17 @@ impl Vertical {
         let tested = core::mem::replace(&mut self.tested, status.tested[RANGE]);
         let refused = core::mem::replace(&mut self.refused, status.refused[RANGE]);
         let resets = core::mem::replace(&mut self.resets, status.resets);
-        let tof = tof.filter(|_| tested != status.tested[RANGE])?;
-        self.reset = resets != status.resets;
+        let tof = tof.filter(|tof| tof.valid && tof.distance.is_finite())?;
         let (distance, expected) = (tof.distance, estimate.height / frame::cos_tilt(&estimate.attitude));
+        let newest = core::mem::replace(&mut self.newest, distance);
+        self.repeats = if distance.to_bits() == newest.to_bits() { self.repeats.saturating_add(1) } else { 0 };
+        let repeats = self.repeats;
+        if tested == status.tested[RANGE] {
+            let jumps = (distance - newest).abs() > JUMP;
+            let (dt, leaps, rejected, compared) = (0.0, false, false, false);
+            return Some(RangeReading { distance, expected, dt, jumps, leaps, repeats, rejected, compared });
+        }
+        self.reset = resets != status.resets;
         let silence = self.range_at.map(|last| at.since(last).seconds());
         self.range_at = Some(at);
         // What the vehicle itself moves by is no jump: it falls at 5 m/s, and leans to the other side
@@ -184,15 +195,13 @@ impl Vertical {
         let free = SIGMAS * status.climb_sigma * silence.unwrap_or(0.0);
         let jumps = follows && change > JUMP + free;
         let leaps = follows && change > LEAP + free && (distance - expected).abs() > LEAP;
-        let repeats = distance.to_bits() == self.distance.to_bits();
-        self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
         (self.distance, self.expected) = (distance, expected);
         let rejected = refused != status.refused[RANGE];
         if rejected {
             self.rejected = Some(at);
         }
         let dt = math::smaller(silence.unwrap_or(0.0), LONGEST);
-        Some(RangeReading { distance, expected, dt, jumps, leaps, repeats: self.repeats, rejected })
+        Some(RangeReading { distance, expected, dt, jumps, leaps, repeats, rejected, compared: true })
     }
 
     /// Takes the newest altitude.

@@ -39,7 +39,9 @@ impl Hypothesis for RangeJumped {
     const FINDING: Finding = Finding::Jumped;
 
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
-        let Some(range) = seen.range.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
+        let Some(range) = seen.range.as_ref().filter(|range| range.compared && !seen.stands) else {
+            return Opinion::Unknown;
+        };
         if !seen.trusts_range {
             let agrees = (range.distance - range.expected).abs() < AGREES && !range.jumps && range.repeats < REPEATED;
             return if agrees { Opinion::Fits } else { Opinion::Misfits };

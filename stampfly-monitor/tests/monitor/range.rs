@@ -32,6 +32,19 @@ fn what_stays_at_a_value_is_stuck() {
 }
 
 #[test]
+fn what_is_never_compared_is_stuck_if_it_stays_at_a_value_and_nothing_if_it_does_not() {
+    for found in found(|readings| readings.range = 0.03) {
+        let (finding, after) = found.expect("found");
+        assert_eq!(finding, Finding::Stuck);
+        assert!(after < 1.0, "{after} s");
+    }
+    // A smeared window, which is read with noise. Nothing holds the height of this estimate meanwhile.
+    for found in found(|readings| readings.range = 0.03 + 1e-3 * (20.0 * readings.time).fract()) {
+        assert!(found.is_none_or(|(range, _)| range == Finding::None), "{found:?}");
+    }
+}
+
+#[test]
 fn a_door_is_no_fault_of_the_range() {
     for rise in [1.5, -1.5] {
         for found in found(|readings| readings.altitude += rise * (readings.time / 0.8).min(1.0)) {

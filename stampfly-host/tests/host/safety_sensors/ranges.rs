@@ -4,13 +4,14 @@ use super::*;
 
 type Lie = Box<dyn FnMut(f32, &mut TofData)>;
 
-/// Lies, how high the vehicle may get from its 0.5 m, m, and within how many seconds they must be found, if they can be. What
-/// reads as where the vehicle stood is the sensor's window, and left out.
+/// Lies, how high the vehicle may get from its 0.5 m, m, and within how many seconds they must be found,
+/// if they can be. What reads as where the vehicle stood is the sensor's window and left out, until it
+/// is seen to be stuck.
 fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
     let mut held = None;
     let mut count = 0u32;
     vec![
-        ("low", Box::new(|_, tof: &mut TofData| (tof.distance, tof.valid) = (0.03, true)), 1.0, None),
+        ("low", Box::new(|_, tof: &mut TofData| (tof.distance, tof.valid) = (0.03, true)), 1.0, Some(1.0)),
         ("stuck", Box::new(move |_, tof: &mut TofData| *tof = *held.get_or_insert(*tof)), 1.0, Some(2.0)),
         ("half", Box::new(|_, tof: &mut TofData| tof.distance *= 0.5), 1.0, Some(0.5)),
         ("0.3 m too low", Box::new(|_, tof: &mut TofData| tof.distance -= 0.3), 1.0, Some(0.5)),
@@ -23,7 +24,7 @@ fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
                     tof.distance = 0.03;
                 }
             }),
-            1.0,
+            0.8,
             None,
         ),
         // It is followed until it ends: no other sensor knows better in a room with doors.
