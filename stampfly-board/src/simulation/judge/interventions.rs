@@ -40,6 +40,8 @@ const UNKNOWN: Alerts = Alerts::RANGE_IMPLAUSIBLE
     .with(Alerts::ESTIMATE_DIVERGED);
 /// Of those, what is no news where no floor is in reach.
 const SEES_NOTHING: Alerts = Alerts::TOF_LOST.with(Alerts::FLOW_LOST);
+/// Alerts of a battery that does not carry the vehicle.
+const SPENT: Alerts = Alerts::CRITICAL_BATTERY.with(Alerts::NO_LIFT);
 /// The name of no alert.
 const NONE: &str = "NONE";
 
@@ -216,6 +218,8 @@ impl Interventions {
     fn note(&mut self, at: Instant, action: &'static str, alert: String, needless: bool) {
         let state = self.soundness.state();
         let State { sound, height, speed, .. } = state;
+        // What is wrong beside the battery may have landed it.
+        let other = common(self.alerts, LAND | UNKNOWN).without(SPENT).without(SEES_NOTHING);
         self.list.push(Intervention {
             t_s: at.seconds_f64(),
             alert,
@@ -226,7 +230,7 @@ impl Interventions {
             tilt_deg: f64::from(state.tilt().to_degrees()),
             attitude_error_deg: f64::from(state.attitude_error().to_degrees()),
             by_protection: self.cut_off || self.alerts.intersects(CUT),
-            spent: action == "land" && !state.carried,
+            spent: action == "land" && !state.carried && other.is_empty(),
         });
     }
 }
