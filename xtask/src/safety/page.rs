@@ -43,14 +43,17 @@ fn ablation(results: &Results) -> String {
     let needless = |found: &Found| found.report["needless_cuts"].as_u64().unwrap_or(0);
     let flights = all.report["faulted"]["wrong_end"]["of"].as_u64().unwrap_or(0);
     let mut text = format!(
-        "\n```console\n$ {}\n```\n\n| without | wrong ends of {} | more than with all | of these flights | needless cuts |\n\
+        "\nFlown by {}:\n\n```console\n$ {}\n```\n\n| without | wrong ends of {} | more than with all | of these flights | needless cuts |\n\
          |---|---|---|---|---|\n| none | {} | | | {} |\n",
+        all.program.flown_by,
         all.line,
         thousands(flights),
         wrong(all),
         needless(all)
     );
-    for found in results.results.iter().filter(|result| result.name.starts_with(WITHOUT)) {
+    // Another program's flights are other flights.
+    let compared = |found: &&Found| found.name.starts_with(WITHOUT) && found.program == all.program;
+    for found in results.results.iter().filter(compared) {
         let name = found.name.strip_prefix(WITHOUT).unwrap_or_default();
         let more = wrong(found).cast_signed() - wrong(all).cast_signed();
         let share = 100.0 * more as f64 / flights.max(1) as f64;
@@ -62,16 +65,17 @@ fn ablation(results: &Results) -> String {
 fn rates(results: &Results) -> String {
     let faults: Vec<_> =
         results.results.iter().filter(|result| result.report.get("faulted").is_some() && !ablates(result)).collect();
-    let mut text = format!("\nFlown by {}:\n\n```console\n", results.flown_by);
+    let mut text = "\n```console\n".to_owned();
     for result in &faults {
         let _ = writeln!(text, "$ {}", result.line);
     }
     text += "```\n\nFlights with a fault that changed something:\n\n\
-             | campaign | flights | wrong end | invariant violated |\n|---|---|---|---|\n";
-    for Found { name, report, .. } in &faults {
+             | campaign | flown by | flights | wrong end | invariant violated |\n|---|---|---|---|---|\n";
+    for Found { name, program, report, .. } in &faults {
         let part = |what: &str| rate(&report["faulted"][what]);
-        let flights = whole(&report["faulted"]["failed"]["of"]);
-        let _ = writeln!(text, "| {name} | {flights} | {} | {} |", part("wrong_end"), part("invariant_violated"));
+        let (by, flights) = (&program.flown_by, whole(&report["faulted"]["failed"]["of"]));
+        let [wrong, violated] = ["wrong_end", "invariant_violated"].map(part);
+        let _ = writeln!(text, "| {name} | {by} | {flights} | {wrong} | {violated} |");
     }
     text += "\nFlights without a fault:\n\n| campaign | flights | failed |\n|---|---|---|\n";
     for Found { name, report, .. } in &faults {
@@ -132,12 +136,18 @@ fn sticks(results: &Results) -> String {
     for result in &files {
         let _ = writeln!(text, "$ {}", result.line);
     }
-    text += "```\n\n| files | flights | without an intervention while sound | interventions while sound |\n|---|---|---|---|\n";
-    for Found { name, report, .. } in &files {
+    text += "```\n\n| files | flown by | flights | without an intervention while sound | interventions while sound |\n\
+             |---|---|---|---|---|\n";
+    for Found { name, program, report, .. } in &files {
         let named = interventions(&report["while_sound"]);
         let named = if named.is_empty() { "none".into() } else { named };
-        let _ =
-            writeln!(text, "| {name} | {} | {} | {named} |", whole(&report["flights"]), rate(&report["unhindered"]));
+        let _ = writeln!(
+            text,
+            "| {name} | {} | {} | {} | {named} |",
+            program.flown_by,
+            whole(&report["flights"]),
+            rate(&report["unhindered"])
+        );
     }
     text += "\nThe files among them in which a sound vehicle did something by itself:\n\n\
              | files | file | mode | flights | what it did |\n|---|---|---|---|---|\n";
@@ -206,7 +216,12 @@ fn cell(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::safety::results::Program;
     use serde_json::json;
+
+    fn program(commit: &str) -> Program {
+        Program { flown_by: commit.into(), golden: String::new() }
+    }
 
     fn results() -> Results {
         let rate = |count: u64, of: u64| json!({ "count": count, "of": of, "rate": 0.01, "low": 0.005, "high": 0.02 });
@@ -220,10 +235,11 @@ mod tests {
         let part = json!({
             "flights": 2_900, "failed": rate(9, 2_900), "wrong_end": rate(29, 2_900), "invariant_violated": rate(0, 2_900),
         });
-        let mut results = Results { flown_by: "version 0.3.0".into(), ..Results::default() };
+        let mut results = Results::default();
         results.put(
             "usual sizes",
             "stampfly campaign --faults",
+            &program("1a"),
             &json!({
                 "flights": 3_000, "faulted": part, "nominal": { "flights": 0 },
                 "cuts": { "IMPACT": rate(3, 40), "IMPACT+TUMBLED": rate(0, 2) },
@@ -234,6 +250,7 @@ mod tests {
         results.put(
             "recordings",
             "stampfly campaign --sticks",
+            &program("2b"),
             &json!({
                 "flights": 156, "well": rate(1, 156), "unhindered": rate(133, 156),
                 "while_sound": { "FLOW_IMPLAUSIBLE mode": 1, "IMU_FAULTY cut": 16 },
@@ -250,7 +267,10 @@ mod tests {
         let results = results();
         let rates = rates(&results);
         assert!(rates.contains("$ stampfly campaign --faults\n") && !rates.contains("--sticks"), "{rates}");
-        assert!(rates.contains("| usual sizes | 2,900 | 29 of 2,900, 1.00 % (0.50 to 2.00 %) | 0 of 2,900"), "{rates}");
+        assert!(
+            rates.contains("| usual sizes | 1a | 2,900 | 29 of 2,900, 1.00 % (0.50 to 2.00 %) | 0 of 2,900"),
+            "{rates}"
+        );
         assert!(rates.contains("| `IMPACT`, `TUMBLED` | 0 of 2,"), "{rates}");
         let wrong = wrong(&results);
         let row = "| `tof-stuck@hover` | ACRO, seed 17, and 1 more | flown-away | 1.2 m above \\| the highest height |";
@@ -261,7 +281,7 @@ mod tests {
     #[test]
     fn sticks_have_the_most_frequent_intervention_first() {
         let sticks = sticks(&results());
-        let row = "| recordings | 156 | 133 of 156, 1.00 % (0.50 to 2.00 %) | `IMU_FAULTY` cuts 16, `FLOW_IMPLAUSIBLE` changes the mode in 1 |";
+        let row = "| recordings | 2b | 156 | 133 of 156, 1.00 % (0.50 to 2.00 %) | `IMU_FAULTY` cuts 16, `FLOW_IMPLAUSIBLE` changes the mode in 1 |";
         assert!(sticks.contains(row) && !sticks.contains("usual sizes"), "{sticks}");
         assert!(sticks.contains("| recordings | `15` | acro | 3 | `IMU_FAULTY` cuts 2 |"), "{sticks}");
     }
@@ -273,8 +293,8 @@ mod tests {
             let end = json!({ "count": wrong, "of": 3_000, "rate": 0.01, "low": 0.005, "high": 0.02 });
             json!({ "flights": 3_000, "needless_cuts": 4, "faulted": { "flights": 3_000, "failed": end, "wrong_end": end } })
         };
-        results.put(ALL, "stampfly campaign --only tof-stuck", &report(40));
-        results.put(&format!("{WITHOUT}range_stuck"), "stampfly campaign", &report(55));
+        results.put(ALL, "stampfly campaign --only tof-stuck", &program("1a"), &report(40));
+        results.put(&format!("{WITHOUT}range_stuck"), "stampfly campaign", &program("1a"), &report(55));
         let table = ablation(&results);
         assert!(table.contains("| none | 40 | | | 4 |\n| `range_stuck` | 55 | 15 | 0.50 % | 4 |"), "{table}");
         assert!(!rates(&results).contains("monitor:"));

@@ -39,17 +39,24 @@ pub struct Found {
     pub name: String,
     /// The command that flies it.
     pub line: String,
+    /// With what it was flown.
+    pub program: Program,
     /// The kept part of what that printed.
     pub report: Value,
 }
 
-/// All of them, and with what they were flown.
+/// What flew a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Results {
-    /// Version and commit of the program.
+pub struct Program {
+    /// Its version and commit.
     pub flown_by: String,
     /// Hash over the golden flight.
     pub golden: String,
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Results {
     /// In the order of the tables.
     pub results: Vec<Found>,
 }
@@ -66,22 +73,19 @@ impl Results {
         let text = |value: &Value, name: &str| Some(value.get(name)?.as_str()?.to_owned());
         let results = value.get("campaigns")?.as_array()?.iter().map(|campaign| {
             let report = campaign.get("report")?.clone();
-            Some(Found { name: text(campaign, "name")?, line: text(campaign, "line")?, report })
+            let program = Program { flown_by: text(campaign, "flown_by")?, golden: text(campaign, "golden")? };
+            Some(Found { name: text(campaign, "name")?, line: text(campaign, "line")?, program, report })
         });
-        Some(Self {
-            flown_by: text(value, "flown_by")?,
-            golden: text(value, "golden")?,
-            results: results.collect::<Option<_>>()?,
-        })
+        Some(Self { results: results.collect::<Option<_>>()? })
     }
 
     /// Puts a result in the place of an earlier one, or behind the others.
-    pub fn put(&mut self, name: &str, line: &str, report: &Value) {
+    pub fn put(&mut self, name: &str, line: &str, program: &Program, report: &Value) {
         let kept = KEPT.iter().filter_map(|key| Some(((*key).to_owned(), report.get(*key)?.clone())));
         let hindered = report["cells"].as_array().map(|cells| ("hindered".to_owned(), hindered(cells)));
         let kept = kept.filter(|(_, value)| !value.is_array() || value != &report["cells"]).chain(hindered);
         let report = Value::Object(kept.collect::<Map<_, _>>());
-        let result = Found { name: name.to_owned(), line: line.to_owned(), report };
+        let result = Found { name: name.to_owned(), line: line.to_owned(), program: program.clone(), report };
         match self.results.iter_mut().find(|known| known.name == name) {
             Some(known) => *known = result,
             None => self.results.push(result),
@@ -95,12 +99,9 @@ impl Results {
 
     /// Writes them.
     pub fn write(&self, repository: &Repository) -> Result<(), Failure> {
-        let Self { flown_by, golden, results } = self;
-        let campaigns: Vec<_> = results
-            .iter()
-            .map(|Found { name, line, report }| json!({ "name": name, "line": line, "report": report }))
-            .collect();
-        let all = json!({ "flown_by": flown_by, "golden": golden, "campaigns": campaigns });
+        let found = |Found { name, line, program: Program { flown_by, golden }, report }: &Found| json!({ "name": name, "line": line, "flown_by": flown_by, "golden": golden, "report": report });
+        let campaigns: Vec<_> = self.results.iter().map(found).collect();
+        let all = json!({ "campaigns": campaigns });
         let text = serde_json::to_string_pretty(&all).map_err(|e| e.to_string())? + "\n";
         fs::write(repository.root.join(FILE), text).map_err(|e| format!("{FILE}: {e}"))
     }
@@ -136,27 +137,33 @@ mod tests {
         let cell = |file: &str, while_sound: Value| json!({ "file": file, "mode": null, "flights": 3, "ended_well": 3, "while_sound": while_sound });
         let mut results = Results::default();
         let cells = json!([cell("sticks/a.csv", json!({})), cell("/data/b.csv", json!({ "IMPACT cut": 2 }))]);
-        results.put("sticks", "stampfly campaign --sticks", &json!({ "flights": 6, "cells": cells }));
+        results.put(
+            "sticks",
+            "stampfly campaign --sticks",
+            &Program::default(),
+            &json!({ "flights": 6, "cells": cells }),
+        );
         let kept = json!([{ "file": "b", "mode": null, "flights": 3, "while_sound": { "IMPACT cut": 2 } }]);
         assert_eq!(results.of("sticks").map(|found| &found.report), Some(&json!({ "flights": 6, "hindered": kept })));
-        results.put("faults", "stampfly campaign --faults", &json!({ "cells": 371 }));
+        results.put("faults", "stampfly campaign --faults", &Program::default(), &json!({ "cells": 371 }));
         assert_eq!(results.of("faults").map(|found| &found.report), Some(&json!({ "cells": 371 })));
     }
 
     #[test]
     fn results_survive_their_file_and_keep_what_is_needed() {
-        let mut results = Results { flown_by: "0.3.0".into(), golden: "0".into(), results: Vec::new() };
-        results.put("usual", "stampfly campaign", &json!({ "flights": 3, "wall_s": 1.0, "out": "/tmp" }));
-        results.put("drawn", "stampfly campaign --drawn", &json!({ "flights": 4 }));
-        results.put("usual", "stampfly campaign", &json!({ "flights": 5 }));
+        let mut results = Results::default();
+        let [old, new] = ["1a", "2b"].map(|commit| Program { flown_by: commit.into(), golden: "0".into() });
+        results.put("usual", "stampfly campaign", &old, &json!({ "flights": 3, "wall_s": 1.0, "out": "/tmp" }));
+        results.put("drawn", "stampfly campaign --drawn", &old, &json!({ "flights": 4 }));
+        results.put("usual", "stampfly campaign", &new, &json!({ "flights": 5 }));
         let names: Vec<_> = results.results.iter().map(|result| result.name.as_str()).collect();
         assert_eq!(names, ["usual", "drawn"], "in its place");
         assert_eq!(results.of("usual").map(|result| &result.report), Some(&json!({ "flights": 5 })));
+        assert_eq!(results.results.iter().map(|found| &found.program).collect::<Vec<_>>(), [&new, &old]);
         let file = json!({
-            "flown_by": "0.3.0", "golden": "0",
-            "campaigns": [{ "name": "usual", "line": "x", "report": {} }],
+            "campaigns": [{ "name": "usual", "line": "x", "flown_by": "0.3.0", "golden": "0", "report": {} }],
         });
         assert_eq!(Results::parse(&file).map(|results| results.results.len()), Some(1));
-        assert_eq!(Results::parse(&json!({ "campaigns": [] })), None);
+        assert_eq!(Results::parse(&json!({ "campaigns": [{ "name": "usual" }] })), None);
     }
 }

@@ -131,9 +131,13 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         failures.extend(stale(repository, place, &table, arguments.fix)?);
     }
     // Flown again in ten minutes, and not for every change of a gain: said, and no failure.
-    if golden(repository)? != campaigns.golden {
+    let golden = golden(repository)?;
+    let old = campaigns.results.iter().filter(|found| found.program.golden != golden);
+    let old: Vec<_> = old.map(|found| format!("\"{}\"", found.name)).collect();
+    if !old.is_empty() {
         println!(
-            "docs/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety` flies them again"
+            "docs/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety {}` flies them again",
+            old.join(" ")
         );
     }
     if failures.is_empty() { Ok(()) } else { Err(failures.join("\n  ")) }

@@ -1,8 +1,8 @@
 //! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`,
 //! and prints the tables.
 //!
-//! Takes half an hour on two cores, so it is in no lane; the document says with which commit it was
-//! made. Names of campaigns on the command line fly these alone. The recordings of pilots need the
+//! Takes half an hour on two cores, so it is in no lane; the document says which commit flew each
+//! campaign. Names of campaigns on the command line fly these alone. The recordings of pilots need the
 //! folder of recorded flights.
 //!
 //! One campaign more for each hypothesis of the monitor leaves it out: what ends wrong then and not
@@ -17,7 +17,7 @@ use super::program::released;
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, announced, capture, json};
 use crate::safety::page::{ALL, WITHOUT, tables};
-use crate::safety::results::{Results, golden};
+use crate::safety::results::{Program, Results, golden};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -67,6 +67,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     }
     let program = released(repository)?;
     let mut results = Results::read(repository).unwrap_or_default();
+    let flies = Program { flown_by: flown_by(repository)?, golden: golden(repository)? };
     let chosen = |name: &str| arguments.rest.is_empty() || arguments.rest.iter().any(|chosen| chosen == name);
     for (name, line) in campaigns.iter().filter(|(name, _)| chosen(name)) {
         let words: Vec<_> = line.iter().map(String::as_str).collect();
@@ -82,10 +83,8 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
         {
             report.remove("failures");
         }
-        results.put(name, &format!("stampfly campaign {}", line.join(" ")), &report);
+        results.put(name, &format!("stampfly campaign {}", line.join(" ")), &flies, &report);
     }
-    results.flown_by = flown_by(repository)?;
-    results.golden = golden(repository)?;
     results.write(repository)?;
     for ((document, begin, end), table) in tables(&results) {
         print!("{table}");
