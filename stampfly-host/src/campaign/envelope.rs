@@ -22,7 +22,6 @@ use serde::{Deserialize, Serialize};
 use stampfly_sim::Noise;
 use stampfly_sim::sticks::{DRAWN, StickOptions};
 use stampfly_sim::vehicle::{Options, SetupError, Vehicle, WorldKind};
-use std::path::PathBuf;
 
 /// Random number stream of envelopes; that of fault campaigns is another.
 const STREAM: u64 = 1_300;
@@ -44,8 +43,8 @@ const FILES: f64 = 0.25;
 pub struct Envelope {
     /// Seed of the first flight; the others count up.
     pub seed: u64,
-    /// Stick files.
-    pub sticks: Vec<PathBuf>,
+    /// Stick files, and how they are flown. Mode and height are drawn where they say none.
+    pub sticks: Vec<StickOptions>,
     /// What all flights have in common.
     pub options: Options,
 }
@@ -67,7 +66,7 @@ impl Envelope {
         let missions: Vec<_> = V::VARIETY.missions.iter().chain(V::VARIETY.occasions).collect();
         let mission = dice.one(&missions).map(|mission| (**mission).to_owned());
         let height = dice.round(HEIGHT[0], HEIGHT[1]) as f32;
-        let file = dice.one(&self.sticks).map(|file| file.display().to_string());
+        let file = dice.one(&self.sticks).cloned();
         let share = dice.0.unit();
         let (name, mode) = if share < PROGRAM || mode.is_none() {
             options.mission.clone_from(&mission);
@@ -79,12 +78,12 @@ impl Envelope {
             (mission.unwrap_or_default(), mode)
         } else {
             let file = file.filter(|_| share < PROGRAM + PILOT + FILES);
-            let name = file.clone().unwrap_or_else(|| "drawn sticks".to_owned());
-            let file = file.unwrap_or_else(|| format!("{DRAWN}{seed}"));
-            let mut sticks = StickOptions { from_height: Some(height), ..StickOptions::default() };
-            sticks.file = file;
+            let name = file.as_ref().map_or_else(|| "drawn sticks".to_owned(), |sticks| sticks.file.clone());
+            let drawn = || StickOptions { file: format!("{DRAWN}{seed}"), ..StickOptions::default() };
+            let mut sticks = file.unwrap_or_else(drawn);
+            sticks.from_height = sticks.from_height.or(Some(height));
             // A file that changes the mode is about that.
-            let mode = mode.filter(|_| sticks.file().is_ok_and(|file| file.modes().len() == 1));
+            let mode = sticks.mode.clone().or(mode.filter(|_| sticks.file().is_ok_and(|file| file.modes().len() == 1)));
             sticks.mode.clone_from(&mode);
             options.sticks = Some(sticks);
             (name, mode)
@@ -114,5 +113,19 @@ mod tests {
         assert!(count(|options| options.pilot.is_some()) > 20);
         assert!(count(|options| options.sticks.is_some()) > 60);
         assert!(count(|options| options.pilot.is_none() && options.sticks.is_none()) > 20);
+    }
+
+    #[test]
+    fn a_file_is_flown_as_its_options_say() {
+        let file = "t,throttle,roll,pitch,yaw,mode,arm\n0,0.2,0,0,0,acro,1\n1,0.2,0,0,0,acro,1\n";
+        let (file, hover_throttle) = (file.to_owned(), Some("median".to_owned()));
+        let sticks = StickOptions { file, hover_throttle, when_ready: true, ..StickOptions::default() };
+        let envelope = Envelope { seed: 1, sticks: vec![sticks.clone()], options: Options::default() };
+        let flights = (0..100).map(|index| envelope.flight::<StampFly>(index).expect("a flight").0);
+        let flown: Vec<_> =
+            flights.filter_map(|cell| cell.options.sticks).filter(|it| it.file == sticks.file).collect();
+        assert!(flown.len() > 10);
+        assert!(flown.iter().all(|it| it.when_ready && it.hover_throttle == sticks.hover_throttle));
+        assert!(flown.iter().all(|it| it.from_height.is_some() && it.mode.is_some()), "drawn");
     }
 }

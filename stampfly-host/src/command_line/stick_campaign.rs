@@ -65,7 +65,8 @@ fn each_in_every_mode<V: Vehicle>(options: &CampaignOptions) -> Result<Planned, 
 
 /// Flights of the envelope, those of a mission or a file in a mode together.
 fn envelope<V: Vehicle>(options: &CampaignOptions) -> Result<Planned, Failure> {
-    let sticks = if options.sticks.is_empty() { Vec::new() } else { files(&options.sticks)? };
+    let files = if options.sticks.is_empty() { Vec::new() } else { files(&options.sticks)? };
+    let sticks = files.iter().map(|file| options.with_sticks.options(file, None)).collect();
     let envelope = Envelope { seed: options.seed, sticks, options: options.scene.options(options.scene.jitter) };
     let flights = (0..options.flights).map(|index| envelope.flight::<V>(index));
     let mut planned = flights.collect::<Result<Planned, _>>()?;
