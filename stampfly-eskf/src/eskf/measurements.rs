@@ -129,8 +129,7 @@ impl Eskf {
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
         // At a take-off a leg may slip while the picture is blurred. What has been seen before is known
         // well enough for the last centimetres of a landing, and above a table.
-        self.has_seen_floor =
-            self.command.flying && (self.has_seen_floor || distance >= self.config.flow_min_distance);
+        self.has_seen_floor = self.command.flying && (self.has_seen_floor || distance >= self.config.flow_min_distance);
         let takes_off = self.command.flying && !self.has_seen_floor;
         if distance < if takes_off { self.config.flow_min_distance } else { NEAREST } {
             return Err(Refusal::Range);

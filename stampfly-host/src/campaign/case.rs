@@ -9,7 +9,7 @@
 //! flight's seed, and one in ten of them has no fault; with [`Plan::pairs`], half of those with a
 //! fault have two. With [`Plan::drawn`], all flights are of this kind. With [`Plan::only`], the
 //! cells are of these faults alone, and all flights walk through them, again and again with other
-//! seeds.
+//! seeds; with both, the faults are drawn from these, with any size.
 
 use crate::vehicles::DEFAULT;
 use serde::{Deserialize, Serialize};
@@ -80,6 +80,8 @@ pub struct Cases {
     vehicle: &'static str,
     plan: Plan,
     faults: &'static [FaultKind],
+    /// Those that are drawn.
+    drawn: Vec<&'static FaultKind>,
     modes: &'static [&'static str],
     /// Nothing is the one of the campaign's options.
     missions: Vec<Option<&'static str>>,
@@ -105,6 +107,7 @@ impl Cases {
             vehicle: V::NAME,
             plan: plan.clone(),
             faults: V::FAULTS,
+            drawn: V::FAULTS.iter().collect(),
             modes: variety.modes,
             missions: if missions.is_empty() { vec![None] } else { missions },
             moments: V::moments,
@@ -112,11 +115,18 @@ impl Cases {
             chips: variety.chips,
             cells: Vec::new(),
         };
+        let mut kinds = Vec::new();
         for text in &plan.only {
-            Fault::parse(&format!("{text}@0"), V::FAULTS).map_err(|error| format!("--only {error}"))?;
+            let fault = Fault::parse(&format!("{text}@0"), V::FAULTS).map_err(|error| format!("--only {error}"))?;
+            if plan.drawn && fault.kind.name != text {
+                return Err(format!("--only {text}: with --drawn, sizes are drawn, and a fault has its name alone"));
+            }
+            kinds.push(fault.kind);
         }
         if !plan.drawn {
             cases.walk();
+        } else if !kinds.is_empty() {
+            cases.drawn = kinds;
         }
         Ok(cases)
     }
@@ -208,12 +218,12 @@ impl Cases {
         options.pilot = mode.map(Into::into);
         options.mission = mission.map(Into::into).or_else(|| options.mission.take());
         if !dice.0.chance(NOMINAL)
-            && let Some(first) = dice.one(self.faults)
+            && let Some(&first) = dice.one(&self.drawn)
         {
             options.fault = vec![dice.fault(first, &moments, self.times).to_string()];
             if self.plan.pairs && dice.0.chance(0.5) {
                 // Two of a kind would be one.
-                let others: Vec<_> = self.faults.iter().filter(|kind| kind.name != first.name).collect();
+                let others: Vec<_> = self.drawn.iter().copied().filter(|kind| kind.name != first.name).collect();
                 let second = dice.one(&others).map(|kind| dice.fault(kind, &moments, self.times).to_string());
                 options.fault.extend(second);
             }

@@ -147,6 +147,21 @@ fn confined_to_two_faults_all_flights_walk_through_their_cells_again_and_again()
 }
 
 #[test]
+fn random_flights_can_be_confined_to_faults_of_some_kinds() {
+    let only = ["tof-stuck", "flow-bias"].map(String::from).to_vec();
+    let cases = cases(&Plan { drawn: true, only, ..plan(0, false) });
+    assert_eq!(cases.cells(), 0);
+    let faults: Vec<_> = (0..200).flat_map(|index| cases.case(index).options.fault).collect();
+    let count = |name: &str| faults.iter().filter(|fault| fault.starts_with(name)).count();
+    let (stuck, bias) = (count("tof-stuck"), count("flow-bias"));
+    assert_eq!(stuck + bias, faults.len());
+    assert!(stuck > 60 && bias > 60 && faults.len() < 200, "{stuck} and {bias}, and some without one");
+    let line = ["campaign", "--faults", "--flights", "4", "--drawn", "--only", "tof-stuck=0.03"];
+    let wrong = stampfly(&folder("drawn-only"), &line);
+    assert!(wrong.code != 0 && wrong.err.contains("sizes are drawn"), "{}", wrong.err);
+}
+
+#[test]
 fn random_flights_can_be_flown_and_vary() {
     let cases = cases(&plan(0, true));
     let drawn: Vec<_> = (0..2_000).map(|index| cases.case(cases.cells() as u64 + index)).collect();

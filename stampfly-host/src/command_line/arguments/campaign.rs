@@ -55,9 +55,10 @@ pub struct FaultCampaignOptions {
     pub pairs: bool,
     /// Let all flights be random ones: leave out those with the usual values at every moment in
     /// every mode.
-    #[arg(long, requires = "faults", conflicts_with = "only")]
+    #[arg(long, requires = "faults")]
     pub drawn: bool,
-    /// Confine all flights to these faults: each at every moment in every mode, again and again with other seeds.
+    /// Confine all flights to these faults: each at every moment in every mode, again and again with
+    /// other seeds; with `--drawn` at random.
     #[arg(long, value_name = "NAME[=VALUE],…", value_delimiter = ',', requires = "faults", conflicts_with = "pairs")]
     pub only: Vec<String>,
     /// Folder for the flights (Parquet) and the tables (HTML, CSV). Flights that are already there are not flown again.
