@@ -169,10 +169,17 @@ impl Evidence<'_> {
         self.back_to(self.reckoners.older())
     }
 
-    /// The same where the reckoner is worth something.
-    pub(crate) fn back_to_comparable(&self) -> Option<EstimateCorrection> {
+    /// The same to the one that began last before a camera went wrong this time ago, s. `None` where
+    /// reckoners are worth nothing.
+    pub(crate) fn back_to_before(&self, ago: f32) -> Option<EstimateCorrection> {
         let comparable = self.settled && self.flow.is_some_and(|flow| flow.comparable);
-        comparable.then(|| self.back_to_reckoned())
+        comparable.then(|| self.back_to(self.last_before(ago)))
+    }
+
+    /// The reckoner that began last before this time ago, s.
+    pub(crate) fn last_before(&self, ago: f32) -> usize {
+        let older = self.reckoners.older();
+        if self.reckoners.get(1 - older).age > ago { 1 - older } else { older }
     }
 
     /// What takes the estimate back to a reckoner.

@@ -76,7 +76,9 @@ impl Hypothesis for FlowJumped {
                 self.since = is_away.then(|| self.since.map_or(0.0, |time| time + flow.interval));
             }
         }
-        if has_jumped { Opinion::Holds(Some(seen.back_to_reckoned())) } else { Opinion::Unknown }
+        // It jumped within the span of the means, before one of them was away.
+        let ago = SPAN + self.since.unwrap_or_default();
+        if has_jumped { Opinion::Holds(Some(seen.back_to(seen.last_before(ago)))) } else { Opinion::Unknown }
     }
 }
 
