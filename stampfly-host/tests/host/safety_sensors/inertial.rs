@@ -141,8 +141,8 @@ fn an_inertial_sensor_of_half_the_scale_ends_the_flight() {
             let highest = seen.highest(since);
             println!("{scale}, seed {seed}: {took}, {drift:.2} m, {highest:.2} m");
             assert!(took <= Duration::from_secs(8), "{scale}, seed {seed}: {took}");
+            assert!(highest < 1.5, "{scale}, seed {seed}: {highest} m");
             // How far it slides before it touches depends on how it leans by then.
-            assert!(drift < 10.0 && highest < 1.5, "{scale}, seed {seed}: {drift} m, {highest} m");
             (flights, far) = (flights + 1, far + usize::from(drift > 5.0));
         }
     }
