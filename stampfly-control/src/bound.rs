@@ -32,7 +32,7 @@ const TAN_LEAN_MIN: f32 = 0.268;
 /// Slope that is no limit: 89.9°.
 const TAN_ANY: f32 = 1e3;
 
-/// Tangent of the largest lean at which so much thrust, N, makes what is needed upwards, N: height
+/// Tangent of the largest lean at which `available`, N, still has `needed`, N, as its upward part: height
 /// comes before place. Not less than 15°, and [`TAN_ANY`] where nothing is needed.
 pub(crate) fn tan_lean_max(available: f32, needed: f32) -> f32 {
     if needed <= 0.0 {

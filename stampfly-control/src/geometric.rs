@@ -171,7 +171,7 @@ impl GeometricController {
             | Horizontal::Damp
             | Horizontal::Nothing => (demand.x, demand.y, self.tan_tilt_max.min(intent.tan_tilt_max)),
         };
-        // A throttle stick asks for nothing upwards.
+        // A throttle stick demands no climb.
         let needed = if matches!(intent.vertical, Vertical::Path | Vertical::Velocity) { up } else { 0.0 };
         let tan_max = tan_max.min(tan_lean_max(self.config.thrust_max / self.config.mass, needed));
         let length = math::sqrt(x * x + y * y);

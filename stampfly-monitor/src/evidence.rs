@@ -27,7 +27,7 @@ const LEAST_DISTANCE: f32 = 0.02;
 
 /// Share of the full scale from which on a force may have been larger.
 const CLIPS: f32 = 0.9;
-/// After so many intervals readings are missing.
+/// Number of intervals without a reading after which readings are missing.
 const MISSING: f32 = 3.0;
 
 /// A reading of the camera, as the estimator has compared it.

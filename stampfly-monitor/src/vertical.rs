@@ -41,7 +41,7 @@ pub struct RangeReading {
     pub jumps: bool,
     /// It is nearer to that, and just as far from what is expected.
     pub leaps: bool,
-    /// So many before it had the same value, compared or not.
+    /// Number of readings before it, compared or not, that had the same value.
     pub repeats: u32,
     /// The estimator has rejected it.
     pub rejected: bool,

@@ -11,7 +11,7 @@
 //!
 //! | in [`Eskf`](crate::Eskf) | condition |
 //! |---|---|
-//! | start | valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m and half the distance, a distance of at least 0.02 m, and until it has once been so far in a flight of `flow_min_distance`, and a picture that does not move faster than `flow_max_rate` by the reading or by what is predicted, and half as fast by the other |
+//! | start | valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m and half the distance, a distance of at least 0.02 m, `flow_min_distance` until a flight has once reached it, and a picture that does not move faster than `flow_max_rate` by the reading or by what is predicted, and half as fast by the other |
 //! | continue | the same, and a joint test ratio of both axes of at most one |
 //! | stop | one of these fails: refused at once, inactive one second after the last accepted sample |
 //! | inflate | the mean of its innovations is biased in flight: tilt and horizontal gyro bias inflated, accelerometer bias reset |

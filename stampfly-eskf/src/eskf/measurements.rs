@@ -127,8 +127,8 @@ impl Eskf {
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
-        // At a take-off a leg may slip while the picture is blurred. What has been seen before is known
-        // well enough for the last centimetres of a landing, and above a table.
+        // At a take-off a leg may slip while the picture is blurred. After readings from a sharp distance
+        // the velocity is known well enough for the last centimetres of a landing, and above a table.
         self.has_seen_floor = self.command.flying && (self.has_seen_floor || distance >= self.config.flow_min_distance);
         let takes_off = self.command.flying && !self.has_seen_floor;
         if distance < if takes_off { self.config.flow_min_distance } else { NEAREST } {
@@ -177,7 +177,7 @@ impl Eskf {
             }
             let length = |[x, y]: [f32; 2]| math::sqrt(x * x + y * y);
             let picture = length([rows[0].predicted / distance + raw.y, rows[1].predicted / distance - raw.x]);
-            // What contradicts the estimate by more is for the gate.
+            // The gate tests a picture that contradicts the estimate by more.
             let [slower, faster] = [math::smaller(length(rate), picture), math::larger(length(rate), picture)];
             if self.command.flying && faster > fastest && slower > 0.5 * fastest {
                 return Err(Refusal::Range);

@@ -1,4 +1,4 @@
-//! What a camera for optical flow does not see: a floor that is too near, and one that passes too fast.
+//! Limits of a camera for optical flow: a floor that is too near, and one that passes too fast.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{CalibrationResult, EstimateCorrection, EstimatorCommand, FlowData, ImuData, TofData};

@@ -45,7 +45,7 @@ pub struct Envelope {
     pub seed: u64,
     /// Stick files, and how they are flown. Mode and height are drawn where they say none.
     pub sticks: Vec<StickOptions>,
-    /// What all flights have in common.
+    /// Options of all flights.
     pub options: Options,
 }
 

@@ -26,7 +26,7 @@ const CARRIES: f32 = 1.2;
 /// Slower it does not climb, m/s, in the mean over this time, s: as long as gusts push it down.
 const CLIMBS: f32 = 0.05;
 const CLIMB_TIME: f32 = 1.0;
-/// For so long: three times what a gust lasts.
+/// Three times as long as a gust.
 const SPENT: Duration = Duration::from_secs(3);
 /// Meanwhile the ceiling of a take-off's thrust rises from 1.2 of the weight to 1.6, so that motors which give 0.65 of the
 /// demand lift the vehicle.

@@ -23,10 +23,10 @@ use stampfly_types::{Duration, Instant, math};
 
 /// Weight of a step in the mean torque: a time constant of 50 ms at 400 Hz, two of a motor.
 const WEIGHT: f32 = 0.05;
-/// The same for what is usual: 3 s, which a weakness of a tenth of a second does not move.
+/// Weight of a step in the usual torque: 3 s, which a weakness of a tenth of a second does not move.
 const USUAL: f32 = 0.0008;
-/// What is usual may be this many times as large as what becomes so: three quarters of a rotor's share
-/// of the weight. A centre of mass 3 mm aside of a StampFly's 23 about both axes asks for 0.52 of it,
+/// Largest usual torque, as a multiple of a weak motor's: three quarters of a rotor's share of the
+/// weight. A centre of mass 3 mm aside of a StampFly's 23 about both axes asks for 0.52 of it,
 /// and rotors that differ by an eighth for 0.18.
 const STANDING: f32 = 2.5;
 /// A motor is lost from this many times a weak one's torque on: a rotor's share of the weight.

@@ -27,7 +27,7 @@ const SEED: u64 = 1;
 const SOME: u64 = 400;
 const ALL: u64 = 5_000;
 
-/// What flights that do not end well end as, by their seed.
+/// Ends of the flights that do not end well, by their seed.
 type Failed = BTreeMap<u64, String>;
 
 pub fn some(repository: &Repository, _: &Arguments) -> Result<(), Failure> {

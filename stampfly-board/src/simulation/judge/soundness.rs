@@ -25,8 +25,8 @@ const WINDOW: Duration = Duration::from_millis(100);
 /// Of the rate that a lost rotor makes in that time, which is told from a sound vehicle in the
 /// middle.
 const HALF: f32 = 0.5;
-/// A battery is spent when so much of the thrust cannot be made, and it climbs by less than this, m/s,
-/// in the mean over this time, s.
+/// A battery is spent when it cannot make a share of [`MISSING`] of the thrust, and the vehicle climbs
+/// slower than [`CLIMBS`], m/s, both in the mean over [`MEAN`], s.
 const MISSING: f32 = 0.02;
 const CLIMBS: f32 = 0.2;
 const MEAN: f32 = 1.0;
