@@ -9,7 +9,9 @@
 //! | `queue.rs` | which step may start next |
 //! | `passed.rs` | which steps have passed for this commit within a day; `nightly` leaves them out |
 //! | `table.rs` | the table |
+//! | `disk.rs` | removes what passed steps have left, if the disk is nearly full |
 
+mod disk;
 mod passed;
 mod queue;
 mod table;
@@ -97,6 +99,9 @@ fn job(repository: &Repository, lane: Lane, work: &Mutex<Work>, ended: &Condvar,
             Err(log) => eprintln!("FAILED  {:<14} {seconds:>7.1} s\n{log}", step.name),
         }
         let outcome = if outcome.is_ok() { Outcome::Passed } else { Outcome::Failed };
+        if lane == Lane::Ci && outcome == Outcome::Passed {
+            disk::make_room(repository, step.name);
+        }
         if let Err(failure) = passed.remember(step.name, seconds, outcome) {
             eprintln!("{failure}");
         }
