@@ -76,6 +76,8 @@ impl Default for StickConfig {
 
 /// Below this throttle a vehicle under manual thrust that stands on the ground has its motors off.
 const THROTTLE_OFF: f32 = 0.03;
+/// Deflection of both tilt sticks together below which they rest.
+const AT_REST: f32 = 0.1;
 /// A path moves by millimetres in a step; one that moves so far, m, has jumped.
 const JUMP: f32 = 0.1;
 
@@ -308,10 +310,13 @@ impl<R: RateLaw> Controller for CascadeController<R> {
                 feedback + down_in_body * yaw_rate + estimate.attitude.inverse_transform_vector(&turning)
             }
         };
-        let trim = LEAN * self.attitude.tilt_gain;
         // A load that lies askew lifts one leg first, and its torque has to be found before the
-        // others follow.
+        // others follow, however far the vehicle leans meanwhile. Where a stick asks for the lean, a
+        // hand may be what stops it.
         let lifts = input.flight_status.phase == FlightPhase::TakeOff;
+        let asked =
+            matches!(intent.horizontal, Horizontal::Lean { forward, right } if forward.abs() + right.abs() > AT_REST);
+        let trim = if lifts && !asked { f32::MAX } else { LEAN * self.attitude.tilt_gain };
         let free = Intent { grounded: intent.grounded && !lifts, ..intent };
         let [roll, pitch, yaw] = self.answer.step(&free, &target, &estimate.angular_rate, trim, dt);
         let held = [roll, pitch, yaw || intent.grounded];
