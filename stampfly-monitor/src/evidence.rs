@@ -4,7 +4,7 @@ use crate::altimeter::{Altimeter, AltitudeReading};
 use crate::config::MonitorConfig;
 use crate::course::{Course, FitLimits};
 use crate::reckoner::{Reckoner, Reckoners, Restart, Sigmas};
-use crate::vertical::{Block, RangeReading};
+use crate::vertical::{Block, RangeReading, RangeRepeat};
 use crate::vibration::Vibration;
 use stampfly_types::messages::{
     EstimateCorrection, EstimatorStatus, FlowData, ImuData, SensorMask, StateEstimate, Validity,
@@ -85,8 +85,10 @@ pub struct Evidence<'a> {
     pub flow: Option<FlowReading>,
     /// Height and climb rate without the range.
     pub altimeter: &'a Altimeter,
-    /// A range that came in this step.
+    /// A range that the estimator has compared in this step.
     pub range: Option<RangeReading>,
+    /// How often the one that came in this step, compared or not, has repeated itself.
+    pub range_repeat: Option<RangeRepeat>,
     /// The range is not left out.
     pub trusts_range: bool,
     /// The vehicle has a range finder and a barometer, and feels its acceleration.
@@ -169,14 +171,14 @@ impl Evidence<'_> {
         self.back_to(self.reckoners.older())
     }
 
-    /// The same to the one that began last before a camera went wrong this time ago, s. `None` where
-    /// reckoners are worth nothing.
+    /// The correction back to the reckoner that began last before a camera failed `ago` seconds ago.
+    /// `None` where nothing can be compared with reckoners.
     pub(crate) fn back_to_before(&self, ago: f32) -> Option<EstimateCorrection> {
         let comparable = self.settled && self.flow.is_some_and(|flow| flow.comparable);
         comparable.then(|| self.back_to(self.last_before(ago)))
     }
 
-    /// The reckoner that began last before this time ago, s.
+    /// Index of the reckoner that began last before `ago` seconds ago.
     pub(crate) fn last_before(&self, ago: f32) -> usize {
         let older = self.reckoners.older();
         if self.reckoners.get(1 - older).age > ago { 1 - older } else { older }

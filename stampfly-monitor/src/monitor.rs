@@ -147,7 +147,7 @@ impl Monitor {
         if !input.felt {
             recollection.begin(estimate, Sigmas::default());
         }
-        let range = vertical.range(now, input.tof.last().map(|sample| &sample.data), estimate, status);
+        let (range_repeat, range) = vertical.range(now, input.tof.last().map(|sample| &sample.data), estimate, status);
         let altitude = vertical.altitude(input.baro.last(), stands);
         let block = vertical.inertial(now, samples, estimate, stands, trusted.range);
         let seen = Evidence {
@@ -164,6 +164,7 @@ impl Monitor {
             flow,
             altimeter: &vertical.altimeter,
             range,
+            range_repeat,
             trusts_range: trusted.range,
             has_range: input.felt && vertical.has_range() && vertical.altimeter.has_zero(),
             altitude,

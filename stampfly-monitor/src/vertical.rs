@@ -28,7 +28,17 @@ const MOVED: f32 = 0.01;
 /// Rejected ranges, and heights that were moved, count for this long.
 const REMEMBERED: Duration = Duration::from_secs(3);
 
-/// A range that came in a step.
+/// A range that came in a step, whether the estimator compares it or not, as it does not with a window
+/// that reports itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeRepeat {
+    /// Number of readings before it that had the same value.
+    pub count: u32,
+    /// It is far from the one before.
+    pub jumps: bool,
+}
+
+/// A range that the estimator has compared in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeReading {
     /// Along the beam, m.
@@ -41,13 +51,8 @@ pub struct RangeReading {
     pub jumps: bool,
     /// It is nearer to that, and just as far from what is expected.
     pub leaps: bool,
-    /// Number of readings before it, compared or not, that had the same value.
-    pub repeats: u32,
     /// The estimator has rejected it.
     pub rejected: bool,
-    /// The estimator has compared it with what it expects. Where it has not, as with a window that
-    /// reports itself, the reading may still be stuck.
-    pub compared: bool,
 }
 
 /// A block of inertial samples.
@@ -163,27 +168,27 @@ impl Vertical {
         self.moves += u32::from(surface != 0.0 || moved != 0.0);
     }
 
-    /// Takes the newest range.
+    /// Takes the newest range, if there is one in this step.
     pub(crate) fn range(
         &mut self,
         at: Instant,
         tof: Option<&TofData>,
         estimate: &StateEstimate,
         status: &EstimatorStatus,
-    ) -> Option<RangeReading> {
+    ) -> (Option<RangeRepeat>, Option<RangeReading>) {
         let tested = core::mem::replace(&mut self.tested, status.tested[RANGE]);
         let refused = core::mem::replace(&mut self.refused, status.refused[RANGE]);
         let resets = core::mem::replace(&mut self.resets, status.resets);
-        let tof = tof.filter(|tof| tof.valid && tof.distance.is_finite())?;
-        let (distance, expected) = (tof.distance, estimate.height / frame::cos_tilt(&estimate.attitude));
+        let Some(&TofData { distance, .. }) = tof.filter(|tof| tof.valid && tof.distance.is_finite()) else {
+            return (None, None);
+        };
         let newest = core::mem::replace(&mut self.newest, distance);
         self.repeats = if distance.to_bits() == newest.to_bits() { self.repeats.saturating_add(1) } else { 0 };
-        let repeats = self.repeats;
+        let count = self.repeats;
         if tested == status.tested[RANGE] {
-            let jumps = (distance - newest).abs() > JUMP;
-            let (dt, leaps, rejected, compared) = (0.0, false, false, false);
-            return Some(RangeReading { distance, expected, dt, jumps, leaps, repeats, rejected, compared });
+            return (Some(RangeRepeat { count, jumps: (distance - newest).abs() > JUMP }), None);
         }
+        let expected = estimate.height / frame::cos_tilt(&estimate.attitude);
         self.reset = resets != status.resets;
         let silence = self.range_at.map(|last| at.since(last).seconds());
         self.range_at = Some(at);
@@ -201,7 +206,8 @@ impl Vertical {
             self.rejected = Some(at);
         }
         let dt = math::smaller(silence.unwrap_or(0.0), LONGEST);
-        Some(RangeReading { distance, expected, dt, jumps, leaps, repeats, rejected, compared: true })
+        let reading = RangeReading { distance, expected, dt, jumps, leaps, rejected };
+        (Some(RangeRepeat { count, jumps }), Some(reading))
     }
 
     /// Takes the newest altitude.

@@ -11,8 +11,6 @@ use stampfly_types::messages::Finding;
 pub struct FlowFrozen {
     reading: [f32; 2],
     repeats: u32,
-    /// How long it has repeated itself, s.
-    time: f32,
 }
 
 impl Hypothesis for FlowFrozen {
@@ -22,12 +20,11 @@ impl Hypothesis for FlowFrozen {
     fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
         let Some(flow) = &seen.flow else { return Opinion::Unknown };
         let repeats = flow.counts == self.reading && flow.counts != [0.0; 2];
-        (self.repeats, self.time) =
-            if repeats { (self.repeats.saturating_add(1), self.time + flow.interval) } else { (0, flow.interval) };
+        self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
         self.reading = flow.counts;
         // On the ground nothing moves, and flow is not used.
         if self.repeats >= config.flow_repeats && !seen.stands {
-            Opinion::Holds(seen.back_to_before(self.time))
+            Opinion::Holds(seen.back_to_before(self.repeats.saturating_add(1) as f32 * flow.interval))
         } else {
             Opinion::Unknown
         }

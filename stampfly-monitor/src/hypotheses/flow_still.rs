@@ -14,9 +14,8 @@ use stampfly_types::messages::Finding;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStill {
-    /// Readings of nothing that are running, and how long they last, s.
+    /// Number of readings of nothing that are running.
     zeros: u32,
-    time: f32,
     /// How far the body has turned meanwhile, and at most, rad.
     turn: [f32; 2],
     turned: f32,
@@ -33,7 +32,6 @@ impl Hypothesis for FlowStill {
             return Opinion::Unknown;
         }
         self.zeros = self.zeros.saturating_add(1);
-        self.time += flow.interval;
         let bias = seen.estimate.gyro_bias;
         for (turn, rate) in self.turn.iter_mut().zip([flow.turning[0] - bias.y, flow.turning[1] + bias.x]) {
             *turn += rate * flow.interval;
@@ -43,7 +41,7 @@ impl Hypothesis for FlowStill {
             return Opinion::Unknown;
         }
         if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
-            Opinion::Holds(seen.back_to_before(self.time))
+            Opinion::Holds(seen.back_to_before(self.zeros as f32 * flow.interval))
         } else {
             // What stands still agrees with nothing.
             Opinion::Misfits

@@ -39,11 +39,11 @@ impl Hypothesis for RangeJumped {
     const FINDING: Finding = Finding::Jumped;
 
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
-        let Some(range) = seen.range.as_ref().filter(|range| range.compared && !seen.stands) else {
-            return Opinion::Unknown;
-        };
+        let Some(range) = seen.range.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
         if !seen.trusts_range {
-            let agrees = (range.distance - range.expected).abs() < AGREES && !range.jumps && range.repeats < REPEATED;
+            let agrees = (range.distance - range.expected).abs() < AGREES
+                && !range.jumps
+                && seen.range_repeat.is_some_and(|repeat| repeat.count < REPEATED);
             return if agrees { Opinion::Fits } else { Opinion::Misfits };
         }
         if !range.rejected {

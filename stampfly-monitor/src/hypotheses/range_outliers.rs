@@ -25,9 +25,7 @@ impl Hypothesis for RangeOutliers {
     const FINDING: Finding = Finding::Outliers;
 
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
-        let Some(range) = seen.range.as_ref().filter(|range| range.compared && !seen.stands) else {
-            return Opinion::Unknown;
-        };
+        let Some(range) = seen.range.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
         self.jumps = math::larger(self.jumps - range.dt / FADES, 0.0) + f32::from(u8::from(range.jumps));
         if self.jumps > JUMPS || seen.altimeter.has_settled() && seen.moves > MOVES {
             Opinion::Holds(seen.back_to_altimeter())

@@ -44,19 +44,19 @@ impl Hypothesis for RangeStuck {
             // Propellers that stop take an error of the accelerometer with them.
             self.from = altimeter.height;
         }
-        let Some(range) = &seen.range else { return Opinion::Unknown };
-        if range.repeats == 0 {
-            *self = Self { from: altimeter.height, jumped: range.jumps, stood: 0 };
+        let Some(repeat) = &seen.range_repeat else { return Opinion::Unknown };
+        if repeat.count == 0 {
+            *self = Self { from: altimeter.height, jumped: repeat.jumps, stood: 0 };
         }
         if seen.stands {
-            self.stood = range.repeats;
+            self.stood = repeat.count;
             return Opinion::Unknown;
         }
         let needed = if altimeter.has_settled() { WHILE_MOVING } else { UNSETTLED };
-        let stuck = range.repeats >= needed && (altimeter.height - self.from).abs() > MOVED
-            || range.repeats >= AFTER_JUMP && self.jumped
-            || range.repeats >= ALWAYS + self.stood
-            || range.repeats >= FROM_GROUND;
+        let stuck = repeat.count >= needed && (altimeter.height - self.from).abs() > MOVED
+            || repeat.count >= AFTER_JUMP && self.jumped
+            || repeat.count >= ALWAYS + self.stood
+            || repeat.count >= FROM_GROUND;
         if stuck { Opinion::Holds(seen.back_to_altimeter()) } else { Opinion::Unknown }
     }
 }
