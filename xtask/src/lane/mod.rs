@@ -99,13 +99,14 @@ fn job(repository: &Repository, lane: Lane, work: &Mutex<Work>, ended: &Condvar,
             Err(log) => eprintln!("FAILED  {:<14} {seconds:>7.1} s\n{log}", step.name),
         }
         let outcome = if outcome.is_ok() { Outcome::Passed } else { Outcome::Failed };
-        if lane == Lane::Ci && outcome == Outcome::Passed {
-            disk::make_room(repository, step.name);
-        }
         if let Err(failure) = passed.remember(step.name, seconds, outcome) {
             eprintln!("{failure}");
         }
         guard.rows.push(Row { name: step.name, outcome, seconds });
+        if lane == Lane::Ci {
+            let passed = guard.rows.iter().filter(|row| row.outcome == Outcome::Passed);
+            disk::make_room(repository, passed.map(|row| row.name));
+        }
         guard.queue.ended(step);
         drop(guard);
         ended.notify_all();
