@@ -39,13 +39,20 @@ pub struct Found {
     pub name: String,
     /// The command that flies it.
     pub line: String,
-    /// With what it was flown.
+    /// The program that flew it.
     pub program: Program,
     /// The kept part of what that printed.
     pub report: Value,
 }
 
-/// What flew a campaign.
+impl Found {
+    fn json(&self) -> Value {
+        let Self { name, line, program: Program { flown_by, golden }, report } = self;
+        json!({ "name": name, "line": line, "flown_by": flown_by, "golden": golden, "report": report })
+    }
+}
+
+/// The program that flew a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Program {
     /// Its version and commit.
@@ -99,8 +106,7 @@ impl Results {
 
     /// Writes them.
     pub fn write(&self, repository: &Repository) -> Result<(), Failure> {
-        let found = |Found { name, line, program: Program { flown_by, golden }, report }: &Found| json!({ "name": name, "line": line, "flown_by": flown_by, "golden": golden, "report": report });
-        let campaigns: Vec<_> = self.results.iter().map(found).collect();
+        let campaigns: Vec<_> = self.results.iter().map(Found::json).collect();
         let all = json!({ "campaigns": campaigns });
         let text = serde_json::to_string_pretty(&all).map_err(|e| e.to_string())? + "\n";
         fs::write(repository.root.join(FILE), text).map_err(|e| format!("{FILE}: {e}"))
