@@ -103,18 +103,6 @@ impl Cases {
             Some(_) => vec![None],
             None => variety.missions.iter().chain(variety.occasions).copied().map(Some).collect(),
         };
-        let mut cases = Self {
-            vehicle: V::NAME,
-            plan: plan.clone(),
-            faults: V::FAULTS,
-            drawn: V::FAULTS.iter().collect(),
-            modes: variety.modes,
-            missions: if missions.is_empty() { vec![None] } else { missions },
-            moments: V::moments,
-            times: variety.times,
-            chips: variety.chips,
-            cells: Vec::new(),
-        };
         let mut kinds = Vec::new();
         for text in &plan.only {
             let fault = Fault::parse(&format!("{text}@0"), V::FAULTS).map_err(|error| format!("--only {error}"))?;
@@ -123,10 +111,23 @@ impl Cases {
             }
             kinds.push(fault.kind);
         }
+        if kinds.is_empty() {
+            kinds.extend(V::FAULTS);
+        }
+        let mut cases = Self {
+            vehicle: V::NAME,
+            plan: plan.clone(),
+            faults: V::FAULTS,
+            drawn: kinds,
+            modes: variety.modes,
+            missions: if missions.is_empty() { vec![None] } else { missions },
+            moments: V::moments,
+            times: variety.times,
+            chips: variety.chips,
+            cells: Vec::new(),
+        };
         if !plan.drawn {
             cases.walk();
-        } else if !kinds.is_empty() {
-            cases.drawn = kinds;
         }
         Ok(cases)
     }

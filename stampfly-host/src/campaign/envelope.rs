@@ -43,7 +43,7 @@ const FILES: f64 = 0.25;
 pub struct Envelope {
     /// Seed of the first flight; the others count up.
     pub seed: u64,
-    /// Stick files, and how they are flown. Mode and height are drawn where they say none.
+    /// Stick files, and how they are flown. The mode is drawn, and the height where they say none.
     pub sticks: Vec<StickOptions>,
     /// Options of all flights.
     pub options: Options,
@@ -83,7 +83,7 @@ impl Envelope {
             let mut sticks = file.unwrap_or_else(drawn);
             sticks.from_height = sticks.from_height.or(Some(height));
             // A file that changes the mode is about that.
-            let mode = sticks.mode.clone().or(mode.filter(|_| sticks.file().is_ok_and(|file| file.modes().len() == 1)));
+            let mode = mode.filter(|_| sticks.file().is_ok_and(|file| file.modes().len() == 1));
             sticks.mode.clone_from(&mode);
             options.sticks = Some(sticks);
             (name, mode)
