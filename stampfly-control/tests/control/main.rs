@@ -7,3 +7,4 @@ mod fleet;
 mod flight;
 mod gains;
 mod navigator;
+mod take_off;

@@ -37,7 +37,7 @@ fn picture(rate: f32) -> FlowData {
 }
 
 #[test]
-fn a_floor_that_is_too_near_is_not_seen_in_flight() {
+fn a_floor_that_is_too_near_is_not_seen_at_a_take_off() {
     let fusion = |height: f32, flying: bool| {
         let (mut eskf, at) = aloft(height, flying);
         eskf.fuse_flow(at, &picture(0.01))
@@ -45,6 +45,25 @@ fn a_floor_that_is_too_near_is_not_seen_in_flight() {
     assert_eq!(fusion(0.05, true), Fusion::Refused(Refusal::Range));
     assert!(!matches!(fusion(0.05, false), Fusion::Refused(_)), "a hand moves it slowly");
     assert!(!matches!(fusion(0.3, true), Fusion::Refused(_)));
+}
+
+#[test]
+fn a_floor_that_comes_near_in_flight_is_still_seen() {
+    let (mut eskf, mut at) = aloft(0.3, true);
+    assert!(!matches!(eskf.fuse_flow(at, &picture(0.01)), Fusion::Refused(_)));
+    for step in 1..=1_000u32 {
+        at = Instant::from_micros(at.as_micros() + 2_500);
+        let accel = Vec3::new(0.0, 0.0, -GRAVITY);
+        eskf.predict(at, &ImuData { accel, temperature: 25.0, ..ImuData::default() });
+        if step.is_multiple_of(13) {
+            // To 5 cm in two seconds.
+            let distance = 0.3 - 0.25 * (step as f32 / 800.0).min(1.0) + 1e-4 * (step % 7) as f32;
+            _ = eskf.fuse_tof(at, &TofData { distance, valid: true, ..TofData::default() });
+        }
+    }
+    let height = eskf.estimate().height;
+    assert!((0.03..0.08).contains(&height), "{height} m");
+    assert!(!matches!(eskf.fuse_flow(at, &picture(0.01)), Fusion::Refused(_)));
 }
 
 #[test]

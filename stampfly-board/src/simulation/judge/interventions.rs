@@ -218,7 +218,7 @@ impl Interventions {
     fn note(&mut self, at: Instant, action: &'static str, alert: String, needless: bool) {
         let state = self.soundness.state();
         let State { sound, height, speed, .. } = state;
-        // What is wrong beside the battery may have landed it.
+        // Alerts for which it would have landed or flown on in another mode with a fresh battery.
         let other = common(self.alerts, LAND | UNKNOWN).without(SPENT).without(SEES_NOTHING);
         self.list.push(Intervention {
             t_s: at.seconds_f64(),

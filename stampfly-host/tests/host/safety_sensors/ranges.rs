@@ -15,7 +15,8 @@ fn lies() -> Vec<(&'static str, Lie, f32, Option<f32>)> {
         ("stuck", Box::new(move |_, tof: &mut TofData| *tof = *held.get_or_insert(*tof)), 1.0, Some(2.0)),
         ("half", Box::new(|_, tof: &mut TofData| tof.distance *= 0.5), 1.0, Some(0.5)),
         ("0.3 m too low", Box::new(|_, tof: &mut TofData| tof.distance -= 0.3), 1.0, Some(0.5)),
-        ("aliased", Box::new(|_, tof: &mut TofData| tof.distance %= 0.25), 1.0, Some(2.0)),
+        ("aliased", Box::new(|_, tof: &mut TofData| tof.distance %= 0.2), 1.0, Some(0.5)),
+        ("aliased to the window", Box::new(|_, tof: &mut TofData| tof.distance %= 0.25), 1.0, Some(2.0)),
         (
             "outliers",
             Box::new(move |_, tof: &mut TofData| {

@@ -80,7 +80,6 @@ fn from_one_manual_mode_to_another_nothing_is_waited_for() {
     assert_eq!(world.sends(&mut machine, frame(FlightMode::Stabilize, true, 0.0)).mode, FlightMode::Stabilize);
 }
 
-/// The switch is turned while the vehicle takes off: the mode comes when it flies.
 #[test]
 fn a_take_off_in_acro_is_over_after_three_seconds_though_a_hand_holds_the_vehicle() {
     for (mode, phase) in [(FlightMode::Acro, FlightPhase::Flying), (FlightMode::Stabilize, FlightPhase::TakeOff)] {
@@ -93,6 +92,7 @@ fn a_take_off_in_acro_is_over_after_three_seconds_though_a_hand_holds_the_vehicl
     }
 }
 
+/// The switch is turned while the vehicle takes off: the mode comes when it flies.
 #[test]
 fn a_manual_mode_chosen_on_the_way_up_waits_for_the_throttle_too() {
     let (mut machine, mut world) = in_phase(FlightPhase::IdleGround);

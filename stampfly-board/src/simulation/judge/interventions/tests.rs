@@ -172,6 +172,22 @@ fn what_a_person_or_a_program_asks_for_is_none() {
 }
 
 #[test]
+fn a_landing_is_for_the_battery_only_without_another_alert_that_lands() {
+    let spent = |voltage: f32, alerts: Alerts| {
+        let mut flight = Flight::new(&[]);
+        flight.truth.battery_voltage = voltage;
+        flight.fly(0.01);
+        flight.alerts(alerts);
+        flight.status(FlightPhase::Landing, FlightMode::Stabilize);
+        flight.interventions.list()[0].spent
+    };
+    let empty = Alerts::CRITICAL_BATTERY;
+    assert!(spent(2.9, empty) && spent(2.9, Alerts::NO_LIFT) && spent(2.9, empty.with(Alerts::TOF_LOST)));
+    assert!(!spent(2.9, empty.with(Alerts::STRUCK)) && !spent(2.9, empty.with(Alerts::RANGE_IMPLAUSIBLE)));
+    assert!(!spent(3.8, empty), "it is not empty");
+}
+
+#[test]
 fn another_mode_is_one_unless_the_switch_was_turned_or_no_floor_is_in_reach() {
     let changes = |height: f32, alerts: Alerts, turns: bool| {
         let mut flight = Flight::new(&[]);
