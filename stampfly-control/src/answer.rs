@@ -2,7 +2,8 @@
 //!
 //! One that a hand or the ground holds does not, and whatever an integral learns meanwhile is wrong once it is let go. What a stick
 //! asks for comes at once, or never. The attitude loop is another matter: it asks for a rate that does not come wherever
-//! a constant torque leans the vehicle, and the integral has to find that torque; but for no more than the integral can hold.
+//! a constant torque leans the vehicle, and the integral has to find that torque; but for no more than the integral can hold,
+//! except in a take-off with its sticks at rest.
 //!
 //! For a loop with an integral or an estimate of what disturbs it. Not a detector of faults: a propeller that is lost turns the vehicle.
 
@@ -27,7 +28,7 @@ pub(crate) struct Answer {
 
 impl Answer {
     /// The axes about which something keeps the vehicle from turning. `target` and `rate` in body axes, rad/s, `dt` seconds after the
-    /// last; `trim`: the rate that the attitude loop asks for where the tilt integral is at its bound, rad/s.
+    /// last; `trim`: the largest rate, rad/s, for which a tilt integral need not wait where no stick asks for rates.
     #[inline]
     pub(crate) fn step(&mut self, intent: &Intent, target: &Vec3, rate: &Vec3, trim: f32, dt: f32) -> [bool; 3] {
         // A division for each step would be dearer than the rest.

@@ -36,9 +36,9 @@ use stampfly_types::{Duration, Instant};
 pub const UNFELT: Alerts = Alerts::FORCE_IMPLAUSIBLE.with(Alerts::ACCEL_FAULTY);
 /// Cosine of the largest tilt, 15°, before and after turning over.
 const LEVEL: f32 = 0.966;
-/// A take-off in ACRO is over after this time, legs free or not: it levels itself, and to turn whatever
-/// holds the vehicle fills the integrals of its rate loops. A take-off frees its legs within a second.
-const LEVELS_ITSELF: Duration = Duration::from_secs(3);
+/// A take-off in ACRO is over after this time, legs free or not. It levels the vehicle, and on one that a
+/// hand holds that fills the integrals of the rate loops. A take-off frees its legs within a second.
+const ACRO_TAKE_OFF: Duration = Duration::from_secs(3);
 
 impl State {
     /// Is the vehicle so close to the ground that the motors may be stopped?
@@ -272,7 +272,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             let rises = facts.known_height().is_none_or(|height| height > config.standing_height);
             facts.takeoff_complete
                 || (state.mode.is_manual() && facts.contact == GroundContact::Air && rises)
-                || (state.mode == FlightMode::Acro && waited(LEVELS_ITSELF))
+                || (state.mode == FlightMode::Acro && waited(ACRO_TAKE_OFF))
         }
         Event::TakeOff => {
             let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;

@@ -124,7 +124,8 @@ became thrust at once would fall.
 
 Turned to STABILIZE or ACRO, the vehicle is in ALT_HOLD until the throttle stick has passed the hover once, upwards or
 downwards. Tilt follows the sticks at once. A switch that was turned during take-off counts when the vehicle flies, by the
-same rule. From STABILIZE to ACRO and back there is nothing to wait for."
+same rule. From STABILIZE to ACRO and back there is nothing to wait for. A take-off in ACRO levels itself until the legs
+are free, for three seconds at most."
     );
 }
 
