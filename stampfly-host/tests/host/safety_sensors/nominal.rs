@@ -44,7 +44,7 @@ fn fly_at_random(arguments: &[&str], flights: u64, ends: &[&str]) {
     }
 }
 
-/// Flow was convicted in three of these, because the comparison began with a reading of two frames (D-073).
+/// In three of these flow was once reported as faulty: the comparison began with a reading of two frames.
 #[test]
 fn random_missions_at_twice_the_vibration_raise_no_alert() {
     fly_at_random(&["--gust", "0", "--seed", "18"], 10, &["transparent"]);
