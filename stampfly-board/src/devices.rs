@@ -43,6 +43,8 @@ pub const SPI_SPUN: Duration = Duration::from_micros(50);
 /// The rhythm of the inertial sensor on the bus it shares.
 pub const RHYTHM: Rhythm = Rhythm::HZ_400;
 /// The flow sensor's longest transfer: 87 µs on the wires for twelve bytes with their pause, the rest for software.
+// A longer one would give up inertial transfers: one that is out of its rhythm waits for the guest to end, and its own limit,
+// 310 µs for a register, is 200 for the guest, 3 on the wires and 107 for a set-up from a cold cache.
 pub const LONGEST_FLOW: Duration = Duration::from_micros(200);
 const I2C: TransferLimit = TransferLimit::I2C_SENSORS;
 
