@@ -31,6 +31,7 @@ stampfly_bus::schedule! {
     /// Mixer, motor curve, motor output.
     actuation = Actuation: after control, flight, 40 us;
 
+    // It takes all samples since its last run. With each sample it would always be due, and starve the lines below.
     /// Still-calibration.
     calibration = Calibration: every 20 ms, background, 144 us;
     /// Command arbitration.

@@ -74,7 +74,8 @@ const MAX_STEP: f32 = 0.5;
 /// 400 Hz with every fourth one, for a quarter of the work. The covariance changes in tenths of seconds. (PX4's EKF2 takes
 /// 10 ms, too: `EKF2_PREDICT_US`.)
 const COVARIANCE_STEP: f32 = 9e-3;
-/// Largest standard deviation of a velocity that the vehicle brakes by, m/s.
+/// Largest standard deviation of a velocity that the vehicle brakes by, m/s. Without flow it is seen by drag alone: at 0.4 1/s, a
+/// velocity of 1 m/s is 0.4 m/s², as much as an accelerometer bias or a wind of 1 m/s.
 const BRAKES: f32 = 1.5;
 /// Below this height, m, the ground may carry it, and what it feels is no drag: it comes down level.
 const LEVEL: f32 = 0.12;
