@@ -1,4 +1,4 @@
-//! A quadcopter of one's own, from its mass to a hover a metre above the floor: the program of the tutorial `docs/tutorial.md`.
+//! A quadcopter of one's own, from its mass to a hover a metre above the floor: the program of the tutorial `docs/guide/tutorial.md`.
 //!
 //! It stands still until its sensors are calibrated, climbs, flies a step to the north and holds its place. The flight is logged and
 //! flown again from the log, bit for bit.

@@ -1,4 +1,4 @@
-//! A sensor that the estimator does not know: distances to two radio beacons, a fifth of a second late. For `docs/how-to-measurement.md`.
+//! A sensor that the estimator does not know: distances to two radio beacons, a fifth of a second late. For `docs/guide/measurement.md`.
 //!
 //! The vehicle stands three metres from where its estimator believes it to be. The distances put it right.
 

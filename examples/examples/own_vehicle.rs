@@ -1,4 +1,4 @@
-//! A delivery robot from the crates alone: two wheels, a gyroscope, a satellite receiver. For `docs/your-own-vehicle.md`.
+//! A delivery robot from the crates alone: two wheels, a gyroscope, a satellite receiver. For `docs/guide/own-vehicle.md`.
 //!
 //! It stands facing north until it sees its satellites, drives round two corners and stops. Its log is driven again, bit for bit.
 

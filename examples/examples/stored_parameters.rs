@@ -1,4 +1,4 @@
-//! Parameters that survive a restart, and one that is refused: for `docs/how-to-parameters.md`.
+//! Parameters that survive a restart, and one that is refused: for `docs/guide/stored-parameters.md`.
 
 use stampfly_param::types::messages::FlightStatus;
 use stampfly_param::{Disarmed, RamFlash, blocking::ParameterStore};

@@ -2,7 +2,7 @@
 //!
 //! The first twelve are document 000's, at its rates; barometer and battery monitor at what their chips give. The log
 //! reads every topic through its tap and is not named.
-//! `docs/topics.md` and `stampfly topics` are printed from this table.
+//! `docs/reference/topics.md` and `stampfly topics` are printed from this table.
 
 use crate::messages::*;
 use stampfly_control::autotune::AutotuneStatus;

@@ -11,7 +11,7 @@ use stampfly_types::messages::{Alerts, ArmBlocks, FlightMode, FlightPhase, Valid
 pub struct Check {
     /// Its bit.
     pub block: ArmBlocks,
-    /// What it refuses, in words: for `docs/modes.md`.
+    /// What it refuses, in words: for `docs/reference/modes.md`.
     pub refuses: &'static str,
     /// Unit of value and limit; `""` for a condition, whose value is 1.
     pub unit: &'static str,

@@ -10,7 +10,7 @@
 //!                                                      FLIP ─land─► LANDING
 //! ```
 //!
-//! [`decide`](crate::decision::decide) finds out which events have happened. `docs/modes.md` is printed from [`TABLE`] and
+//! [`decide`](crate::decision::decide) finds out which events have happened. `docs/reference/modes.md` is printed from [`TABLE`] and
 //! [`Event::guard`].
 
 use stampfly_types::messages::FlightPhase;
@@ -61,7 +61,7 @@ impl Event {
         Self::Ready,
     ];
 
-    /// When it happens, in words: for `docs/modes.md`.
+    /// When it happens, in words: for `docs/reference/modes.md`.
     #[must_use]
     pub const fn guard(self) -> &'static str {
         match self {

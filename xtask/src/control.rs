@@ -1,4 +1,4 @@
-//! The list of what is broken to see each step fail, `xtask/controls.toml`, and its table in `docs/checks.md`.
+//! The list of what is broken to see each step fail, `xtask/controls.toml`, and its table in `docs/reference/checks.md`.
 
 use crate::repository::{Failure, Repository};
 use std::fmt::Write;
@@ -10,7 +10,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 const FILE: &str = "xtask/controls.toml";
 /// The document, and what is before and after the table.
 pub const PLACE: (&str, &str, &str) =
-    ("docs/checks.md", "<!-- controls: cargo xtask docs --fix -->\n", "<!-- end of controls -->");
+    ("docs/reference/checks.md", "<!-- controls: cargo xtask docs --fix -->\n", "<!-- end of controls -->");
 
 /// What is broken to see one step fail.
 #[derive(Clone, Debug, Default, PartialEq)]

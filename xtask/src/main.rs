@@ -164,7 +164,7 @@ const STEPS: &[Step] = &[
         .accepting(&[Fix, Rest]),
     Step::manual("msrv-build", "Build the libraries with the oldest Rust they promise", steps::msrv::build),
     Step::manual("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters).accepting(&[Rest]),
-    Step::manual("safety", "Fly the campaigns of docs/safety.md and write their tables", steps::safety::run)
+    Step::manual("safety", "Fly the campaigns of docs/explain/safety.md and write their tables", steps::safety::run)
         .accepting(&[Rest]),
     Step::manual("figures", "Measure the README's figures and write them there", steps::figures::run),
 ];

@@ -1,7 +1,7 @@
 //! A flight of a campaign as one row of a table: what decides it, how it ended, its figures, its hash.
 //!
 //! The table of columns below makes [`Row`], and what is known of its columns: files of rows are written and read by it,
-//! and `docs/campaigns.md` is held to it.
+//! and `docs/guide/campaigns.md` is held to it.
 
 use super::case::{Case, rest};
 use stampfly_sim::fault::FAULT_ACTED;

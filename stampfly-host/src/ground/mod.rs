@@ -9,7 +9,7 @@
 //! | [`Server`] | serves the page and its WebSockets |
 //! | [`demo`] | the page with the whole simulation inside, as one file |
 //!
-//! The protocol is described in `docs/ground-station.md`.
+//! The protocol is described in `docs/stampfly/ground-station.md`.
 
 mod client;
 pub mod demo;

@@ -1,6 +1,6 @@
 //! The default controller beside the incremental one, on vehicles that are not as the airframe says.
 //!
-//! The figures of `docs/controllers.md`:
+//! The figures of `docs/explain/controllers.md`:
 //! `STAMPFLY_THOROUGH=1 cargo test --release -p stampfly-host --test host controllers -- --nocapture`.
 
 use crate::thorough::thorough;

@@ -67,7 +67,7 @@ fn the_same_vehicle_gives_the_same_file() {
     assert_eq!(one, other);
 }
 
-/// The silences that `docs/first-flight.md` tells.
+/// The silences that `docs/stampfly/first-flight.md` tells.
 #[test]
 fn every_sensor_measures_within_a_second_and_it_is_ready_within_four() {
     with_vehicle(None, 1, |bench| {

@@ -626,7 +626,7 @@ fn mistakes_are_named() {
 
 #[test]
 fn the_document_lists_the_columns() {
-    let document = include_str!("../../../docs/campaigns.md");
+    let document = include_str!("../../../docs/guide/campaigns.md");
     for Column { name, kind, is_optional, meaning } in Row::common() {
         let kind = match kind {
             Kind::Integer => "UBIGINT",
@@ -636,7 +636,7 @@ fn the_document_lists_the_columns() {
         };
         let empty = if is_optional { ", may be empty" } else { "" };
         let line = format!("| `{name}` | {kind}{empty} | {meaning} |\n");
-        assert!(document.contains(&line), "docs/campaigns.md lacks\n{line}");
+        assert!(document.contains(&line), "docs/guide/campaigns.md lacks\n{line}");
     }
     for (name, _) in stampfly_host::campaign::shard::VARIABLES {
         assert!(document.contains(&format!("| `{name}` |")), "{name}");

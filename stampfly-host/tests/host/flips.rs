@@ -1,7 +1,7 @@
 //! Turning over, in every direction and on many seeds: once round, back to its height and its place, without an alert, and down
 //! again as after any flight.
 //!
-//! The figures of `docs/controllers.md`:
+//! The figures of `docs/explain/controllers.md`:
 //! `STAMPFLY_THOROUGH=1 cargo test --release -p stampfly-host --test host flips -- --nocapture`.
 
 use crate::thorough::thorough;

@@ -3,7 +3,7 @@
 //! Those figures were set for a simulation without noise; here every sensor, the air and the propellers are as in any
 //! flight. A simulated pilot hovers with the sticks of each mode, as the missions of `--pilot` do.
 //!
-//! The table of `docs/controllers.md`:
+//! The table of `docs/explain/controllers.md`:
 //! `STAMPFLY_THOROUGH=1 cargo test --release -p stampfly-host --test host flying_quality -- --nocapture`.
 
 use stampfly_board::schedule::Runnables;

@@ -215,7 +215,7 @@ fn moved(mode: &str, hover: f32, sticks: [f32; 4], seconds: f32) -> [f32; 4] {
     [north, east, turned, -down]
 }
 
-/// The signs that `docs/sticks.md` promises, from the file to what the vehicle does while it looks
+/// The signs that `docs/guide/sticks.md` promises, from the file to what the vehicle does while it looks
 /// north.
 #[test]
 fn sticks_move_the_vehicle_the_way_the_page_says() {

@@ -1,6 +1,6 @@
 //! Tuning the rate loops of a StampFly in flight, as built and with an inertia and motors that nobody told it of.
 //!
-//! `cargo test --release -p stampfly-host --test host tunes -- --nocapture` prints the figures of `docs/controllers.md`.
+//! `cargo test --release -p stampfly-host --test host tunes -- --nocapture` prints the figures of `docs/explain/controllers.md`.
 
 use crate::thorough::thorough;
 use stampfly_board::airframe::INERTIA;

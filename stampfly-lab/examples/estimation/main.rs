@@ -1,4 +1,4 @@
-//! The pictures of `docs/estimation.md`: how the estimator does, on simulated and on recorded flights.
+//! The pictures of `docs/explain/estimation.md`: how the estimator does, on simulated and on recorded flights.
 //!
 //! ```sh
 //! cargo run --release -p stampfly-lab --example estimation

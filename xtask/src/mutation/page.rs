@@ -1,4 +1,4 @@
-//! The table of mutants in `docs/safety.md`.
+//! The table of mutants in `docs/explain/safety.md`.
 
 use super::list::{Figures, List, Record};
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// The document, and what is before and after the table.
 pub const PLACE: (&str, &str, &str) =
-    ("docs/safety.md", "<!-- mutants: cargo xtask docs --fix -->\n", "<!-- end of mutants -->");
+    ("docs/explain/safety.md", "<!-- mutants: cargo xtask docs --fix -->\n", "<!-- end of mutants -->");
 
 /// Figures of every file and their sum. A row begins with no code: in this document such rows are known failures of the campaign.
 pub fn table(list: &List) -> String {

@@ -1,11 +1,11 @@
-//! The table of re-inserted bugs in `docs/safety.md`.
+//! The table of re-inserted bugs in `docs/explain/safety.md`.
 
 use super::list::Bug;
 use std::fmt::Write;
 
 /// The document, and what is before and after the table.
 pub const PLACE: (&str, &str, &str) =
-    ("docs/safety.md", "<!-- bugs: cargo xtask docs --fix -->\n", "<!-- end of bugs -->");
+    ("docs/explain/safety.md", "<!-- bugs: cargo xtask docs --fix -->\n", "<!-- end of bugs -->");
 
 /// The table.
 pub fn table(bugs: &[Bug]) -> String {

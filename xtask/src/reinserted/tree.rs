@@ -61,6 +61,6 @@ mod tests {
         let folder = |file: &str| source_folder(Path::new(file));
         assert_eq!(folder("stampfly-mode/src/failsafe/imu.rs"), Some("stampfly-mode/src".into()));
         assert_eq!(folder("vehicles/rover/src/lib.rs"), Some("vehicles/rover/src".into()));
-        assert_eq!(folder("docs/safety.md"), None);
+        assert_eq!(folder("docs/explain/safety.md"), None);
     }
 }

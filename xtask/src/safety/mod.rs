@@ -1,4 +1,4 @@
-//! What campaigns found: the file, and its tables in `docs/safety.md`.
+//! What campaigns found: the file, and its tables in `docs/explain/safety.md`.
 
 pub mod page;
 pub mod results;

@@ -1,4 +1,4 @@
-//! The tables of `docs/safety.md` that come from campaigns.
+//! The tables of `docs/explain/safety.md` that come from campaigns.
 
 use super::results::{Found, Results};
 use serde_json::Value;
@@ -9,15 +9,18 @@ use std::fmt::Write;
 pub type Place = (&'static str, &'static str, &'static str);
 
 /// Rates of the campaigns of faults, and whether cuts were right.
-pub const RATES: Place = ("docs/safety.md", "<!-- rates: cargo xtask docs --fix -->\n", "<!-- end of rates -->");
+pub const RATES: Place =
+    ("docs/explain/safety.md", "<!-- rates: cargo xtask docs --fix -->\n", "<!-- end of rates -->");
 /// Flights of the first campaign that end wrong.
-pub const WRONG: Place = ("docs/safety.md", "<!-- wrong: cargo xtask docs --fix -->\n", "<!-- end of wrong -->");
+pub const WRONG: Place =
+    ("docs/explain/safety.md", "<!-- wrong: cargo xtask docs --fix -->\n", "<!-- end of wrong -->");
 /// Sticks of people.
-pub const STICKS: Place = ("docs/safety.md", "<!-- sticks: cargo xtask docs --fix -->\n", "<!-- end of sticks -->");
+pub const STICKS: Place =
+    ("docs/explain/safety.md", "<!-- sticks: cargo xtask docs --fix -->\n", "<!-- end of sticks -->");
 
 /// What each hypothesis of the monitor is worth.
 pub const ABLATION: Place =
-    ("docs/safety.md", "<!-- ablation: cargo xtask docs --fix -->\n", "<!-- end of ablation -->");
+    ("docs/explain/safety.md", "<!-- ablation: cargo xtask docs --fix -->\n", "<!-- end of ablation -->");
 
 /// The campaign with all hypotheses of the monitor, and the beginning of the names of those without one.
 pub const ALL: &str = "monitor: all hypotheses";

@@ -3,7 +3,7 @@
 //! `xtask/controls.toml` says, for each step, what is broken and what the step has to say then. Here the last commit is cloned
 //! into `target/controls`, broken in one place, and the step is run in that clone: it has to fail, and with these words. Then the
 //! place is repaired. Names of steps on the command line restrict the run to these. `--fix` records what each step said; the table of
-//! all controls is printed into `docs/checks.md` by `cargo xtask docs --fix`.
+//! all controls is printed into `docs/reference/checks.md` by `cargo xtask docs --fix`.
 //!
 //! It is in neither lane: it takes hours, and its result changes only with a step.
 

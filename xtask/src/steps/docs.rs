@@ -37,19 +37,19 @@ const ADDRESSES: &[&str] =
 /// Folder of the pictures.
 const PICTURES: &str = "docs/images";
 /// The table of requirements, and its columns that hold paths.
-const REQUIREMENTS: (&str, [&str; 2]) = ("docs/requirements.md", ["home", "test"]);
+const REQUIREMENTS: (&str, [&str; 2]) = ("docs/reference/requirements.md", ["home", "test"]);
 /// The guide to tuning, and the structure whose fields it must name.
-const TUNING: (&str, &str, &str) = ("docs/estimation.md", "stampfly-eskf/src/config.rs", "EskfConfig");
+const TUNING: (&str, &str, &str) = ("docs/explain/estimation.md", "stampfly-eskf/src/config.rs", "EskfConfig");
 /// The generated documents: the subcommand of `stampfly` that prints the table, and the text before it.
 const GENERATED: &[(&str, &str, &str)] = &[
     (
-        "docs/topics.md",
+        "docs/reference/topics.md",
         "topics",
         "# Topics\n\nThe topics of the StampFly, their publishers and their readers. Printed from the topic table in \
          `stampfly-board/src/topics.rs` by `cargo xtask docs --fix`. The log reads every topic.",
     ),
     (
-        "docs/schedule.md",
+        "docs/reference/schedule.md",
         "schedule",
         "# Schedule\n\nThe activations of the StampFly's runnables. Printed from the activation table in \
          `stampfly-board/src/schedule.rs` by `cargo xtask docs --fix`.\n\nThe budget is the most that an activation \
@@ -59,7 +59,7 @@ const GENERATED: &[(&str, &str, &str)] = &[
          and refuses a table in which a runnable could be late.",
     ),
     (
-        "docs/faults.md",
+        "docs/reference/faults.md",
         "faults",
         "# Faults\n\nWhat can go wrong in a simulated flight of the StampFly: `stampfly fly --fault NAME[=VALUE]@WHEN[+SECONDS]`. \
          Printed from the table in `stampfly-board/src/simulation/faults/table.rs` by `cargo xtask docs --fix`.\n\nWHEN is \
@@ -69,7 +69,7 @@ const GENERATED: &[(&str, &str, &str)] = &[
          `stampfly-board/src/simulation/judge/mod.rs`.",
     ),
     (
-        "docs/modes.md",
+        "docs/reference/modes.md",
         "modes",
         "# Modes\n\nThe mode machine: its phases, who may do what, and what it asks for before arming. Printed from the tables of \
          `stampfly-mode` by `cargo xtask docs --fix`. A test explores every phase with every alert, every pair of alerts and every set of \
@@ -136,7 +136,7 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
     let old: Vec<_> = old.map(|found| format!("\"{}\"", found.name)).collect();
     if !old.is_empty() {
         println!(
-            "docs/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety {}` flies them again",
+            "docs/explain/safety.md: the golden flight has changed since these campaigns; `cargo xtask safety {}` flies them again",
             old.join(" ")
         );
     }
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn links_to_headings_of_other_documents_are_followed() {
-        let other = "../docs/msrv.md";
+        let other = "../docs/reference/msrv.md";
         assert_eq!(checked(&format!("[x]({other}#rust-versions)")), Ok(()));
         assert!(checked(&format!("[x]({other}#no-such-heading)")).is_err());
     }

@@ -3,7 +3,7 @@
 //! The program is the ESP32-C6's, as `esp32` builds it. `stampfly-board/foreign/stages.py` runs it from reset through motors low, chip selects
 //! high and the golden flight to the first control passes: each stage that is not reached fails, and controls with a fault must be
 //! refused. The chip's mask ROM, in whose functions the program's arithmetic runs, is Espressif's, as the archive of the
-//! crate `espflash` has it. How far it comes, and why no further, is in `docs/hardware-status.md`.
+//! crate `espflash` has it. How far it comes, and why no further, is in `docs/explain/hardware-status.md`.
 
 use super::esp32;
 use crate::arguments::Arguments;

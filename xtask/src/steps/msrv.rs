@@ -6,7 +6,7 @@
 //! | no library uses a newer part of the standard library | clippy's `incompatible_msrv`, with all features | `msrv` |
 //! | that compiler builds them, newer syntax included | it does, or the step fails: it installs no compiler | `msrv-build`, by hand |
 //!
-//! `docs/msrv.md` says what is proved by whom.
+//! `docs/reference/msrv.md` says what is proved by whom.
 
 use crate::arguments::Arguments;
 use crate::repository::{Failure, Library, Repository, capture, json, run as run_program};

@@ -13,7 +13,7 @@
 //!
 //! What was caught once is not run again until the code of its package changes, and what survived not until its code or tests do, so a run
 //! that was broken off goes on where it was. A test that was removed is noticed when `mutants/outcomes` in cargo's folder is. `--fix` records
-//! the figures of the files that passed, in the list and in `docs/safety.md`.
+//! the figures of the files that passed, in the list and in `docs/explain/safety.md`.
 
 use crate::arguments::Arguments;
 use crate::mutation::list::{FILE, Figures, List, Record, digest};

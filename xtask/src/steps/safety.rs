@@ -1,4 +1,4 @@
-//! `safety`: flies the campaigns of `docs/safety.md`, keeps what they found in `xtask/safety.json`,
+//! `safety`: flies the campaigns of `docs/explain/safety.md`, keeps what they found in `xtask/safety.json`,
 //! and prints the tables.
 //!
 //! Takes half an hour on two cores, so it is in no lane; the document says which commit flew each

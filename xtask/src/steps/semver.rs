@@ -2,7 +2,7 @@
 //!
 //! What was released last is named in `xtask/release.toml`, as a commit: nothing has to be published for that, and no file has to be
 //! kept beside the sources. Interfaces are compared by `cargo-semver-checks`, with all features. What is removed or changed wants the next
-//! version (`docs/versions.md`); what is added does not. A library whose sources are those of the release is not looked at. It cannot see whether something of the same signature behaves differently.
+//! version (`docs/reference/versions.md`); what is added does not. A library whose sources are those of the release is not looked at. It cannot see whether something of the same signature behaves differently.
 
 use crate::arguments::Arguments;
 use crate::cargo_tool::cargo_tool;
@@ -50,8 +50,9 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
         .arg(&baseline);
     check.args(changed.iter().flat_map(|library| ["-p", &library.name]));
     check.env("CARGO_TARGET_DIR", repository.target("semver"));
-    run_program(&mut check)
-        .map_err(|e| format!("{e}: an interface has changed more than its version; docs/versions.md says what to do"))
+    run_program(&mut check).map_err(|e| {
+        format!("{e}: an interface has changed more than its version; docs/reference/versions.md says what to do")
+    })
 }
 
 /// The commit of the last release.

@@ -2,7 +2,7 @@
 //! rows as one process.
 //!
 //! Server and workers come from HyperQueue's Python package, each in a process of its own (`xtask/campaign/cluster.py`).
-//! The rows are compared by DuckDB, which then runs every query of `docs/campaigns.md`; three flights are flown again from
+//! The rows are compared by DuckDB, which then runs every query of `docs/guide/campaigns.md`; three flights are flown again from
 //! their rows.
 
 use super::program::released;
@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const HYPERQUEUE: &str = "hyperqueue==0.27.0";
 const DUCKDB: &str = "duckdb==2.0.0";
 const CLUSTER: &str = "xtask/campaign/cluster.py";
-const DOCUMENT: &str = "docs/campaigns.md";
+const DOCUMENT: &str = "docs/guide/campaigns.md";
 /// Queries that the document has to have at least.
 const QUERIES: usize = 5;
 

@@ -1,6 +1,6 @@
 //! What can go wrong in a flight of the StampFly: the table of faults, and where each acts.
 //!
-//! `stampfly faults` and `docs/faults.md` print the table. Sensor faults act on samples on their way to the bus, behind
+//! `stampfly faults` and `docs/reference/faults.md` print the table. Sensor faults act on samples on their way to the bus, behind
 //! models and behind drivers alike; a dead bus also silences emulated chips; motor faults act on the plant.
 
 mod act;

@@ -19,7 +19,7 @@ const HYPERLINK: (&str, &str) = ("hyperlink", "0.3.2");
 /// The table of contents in the folder of the pages.
 const CONTENTS: &str = "SUMMARY.md";
 /// The page whose commands are run.
-const TUTORIAL: &str = "docs/tutorial.md";
+const TUTORIAL: &str = "docs/guide/tutorial.md";
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let forgotten = forgotten(repository)?;

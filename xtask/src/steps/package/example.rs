@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab"];
 
 /// The page that says how a vehicle of one's own is made, and its program.
-const VEHICLE: (&str, &str) = ("docs/your-own-vehicle.md", "examples/examples/own_vehicle.rs");
+const VEHICLE: (&str, &str) = ("docs/guide/own-vehicle.md", "examples/examples/own_vehicle.rs");
 
 /// Runs them all, from the archives in this folder.
 pub fn run(repository: &Repository, archives: &Path, libraries: &[Library]) -> Result<(), Failure> {

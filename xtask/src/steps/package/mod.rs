@@ -1,5 +1,5 @@
 //! `package`: each library, as committed, builds from the archive that would be published, and a program that adds it alone runs the
-//! first example of its README. So does the vehicle of `docs/your-own-vehicle.md`, from the archives alone.
+//! first example of its README. So does the vehicle of `docs/guide/own-vehicle.md`, from the archives alone.
 //!
 //! Works on a fresh clone, so that a file that exists but was never committed is noticed. The texts of the licences have to be in
 //! every archive, the same as in the top folder: both licences ask for it.
