@@ -12,6 +12,7 @@ mod copy;
 mod elf;
 mod front_page;
 mod lane;
+mod listing;
 mod machine;
 mod mutation;
 mod page;

@@ -6,7 +6,9 @@
 //! | links to lines (`#L12`) | refused: lines move; name the item in the text instead |
 //! | pictures in `docs/images` | some document shows them |
 //! | paths in the columns `home` and `test` of the table of requirements | they exist |
+//! | figures in the README's column `figure` | a page that measures them has the same |
 //! | the guide to tuning | it names every public field of the filter's configuration |
+//! | listings after `<!-- listing: PATH#PART -->` | they are the same as in that program; `--fix` writes them |
 //! | generated pages | they are what the program prints; `--fix` writes them |
 //! | front pages of crates | description, keywords, categories, all features documented on sites and named in the README |
 //! | changelogs | each published crate has an entry for its version, under one for what comes next |
@@ -20,6 +22,7 @@ use crate::arguments::Arguments;
 use crate::changelog;
 use crate::control::{self, List as Controls};
 use crate::front_page;
+use crate::listing;
 use crate::mutation::list::List as Mutants;
 use crate::mutation::page as mutants;
 use crate::page::Page;
@@ -38,6 +41,9 @@ const ADDRESSES: &[&str] =
 const PICTURES: &str = "docs/images";
 /// The table of requirements, and its columns that hold paths.
 const REQUIREMENTS: (&str, [&str; 2]) = ("docs/reference/requirements.md", ["home", "test"]);
+/// The front page, its column of figures, and the pages they are taken from.
+const FIGURES: (&str, &str, [&str; 3]) =
+    ("README.md", "figure", ["docs/reference/figures.md", "docs/reference/schedule.md", "docs/explain/safety.md"]);
 /// The guide to tuning, and the structure whose fields it must name.
 const TUNING: (&str, &str, &str) = ("docs/explain/estimation.md", "stampfly-eskf/src/config.rs", "EskfConfig");
 /// The generated documents: the subcommand of `stampfly` that prints the table, and the text before it.
@@ -98,9 +104,11 @@ pub fn run(repository: &Repository, arguments: &Arguments) -> Result<(), Failure
                 .map(|e| format!("{name}: {e}")),
         );
         shown.extend(page.pictures);
+        failures.extend(stale_listing(root, name, arguments.fix)?);
     }
     failures.extend(missing_pictures(root, &shown)?);
     failures.extend(missing_paths(root, &read(root, REQUIREMENTS.0)?));
+    failures.extend(missing_figures(root)?);
     failures.extend(missing_fields(root)?);
     failures.extend(changelog::failures(repository)?);
     failures.extend(front_page::failures(repository)?);
@@ -161,6 +169,22 @@ fn stale(
     Ok(Some(format!("{document} is out of date; run `cargo xtask docs --fix`")))
 }
 
+/// A document whose listings differ from their programs.
+fn stale_listing(root: &Path, name: &str, fix: bool) -> Result<Option<Failure>, Failure> {
+    let text = |name: &str| fs::read_to_string(root.join(name)).map_err(|e| format!("{name}: {e}"));
+    let page = text(name)?;
+    let new = listing::refreshed(&page, text).map_err(|e| format!("{name}: {e}"))?;
+    if new == page {
+        return Ok(None);
+    }
+    if fix {
+        fs::write(root.join(name), new).map_err(|e| format!("{name}: {e}"))?;
+        println!("{name}: updated");
+        return Ok(None);
+    }
+    Ok(Some(format!("{name}: a listing differs from its program; run `cargo xtask docs --fix`")))
+}
+
 fn read(root: &Path, name: &str) -> Result<Page, Failure> {
     Ok(Page::parse(&fs::read_to_string(root.join(name)).map_err(|e| format!("{name}: {e}"))?))
 }
@@ -206,6 +230,23 @@ fn missing_paths(root: &Path, page: &Page) -> Vec<Failure> {
         missing.push(format!("{document}: no table"));
     }
     missing
+}
+
+/// Figures of the front page that no page has which measures them.
+fn missing_figures(root: &Path) -> Result<Vec<Failure>, Failure> {
+    let (front, column, pages) = FIGURES;
+    let texts: Result<Vec<String>, Failure> =
+        pages.iter().map(|name| fs::read_to_string(root.join(name)).map_err(|e| format!("{name}: {e}"))).collect();
+    Ok(unknown(&read(root, front)?, column, &texts?)
+        .iter()
+        .map(|figure| format!("{front}: the figure {figure} is in none of {}", pages.join(", ")))
+        .collect())
+}
+
+/// Code spans in this column of a page's tables that are in none of these texts.
+fn unknown(page: &Page, column: &str, texts: &[String]) -> Vec<String> {
+    let cells = page.cells.iter().filter(|(name, _)| name == column).map(|(_, figure)| figure);
+    cells.filter(|figure| !texts.iter().any(|text| text.contains(*figure))).cloned().collect()
 }
 
 /// Fields of the configuration that the guide to tuning leaves out.
@@ -267,6 +308,13 @@ mod tests {
         assert!(missing_paths(here, &table("`src/main.rs`, not yet")).is_empty());
         assert_eq!(missing_paths(here, &table("`src/nowhere.rs`")).len(), 1);
         assert_eq!(missing_paths(here, &Page::parse("no table")).len(), 1);
+    }
+
+    #[test]
+    fn figures_of_the_front_page_are_measured_somewhere() {
+        let page = Page::parse("| what | figure | from |\n|---|---|---|\n| `x` | `1.2` m, `3.4` m | `y` |\n");
+        assert_eq!(unknown(&page, "figure", &["a 1.2 m".to_owned(), "b".to_owned()]), ["3.4"]);
+        assert_eq!(unknown(&page, "figure", &["1.2".to_owned(), "3.4".to_owned()]), [""; 0]);
     }
 
     #[test]
