@@ -22,3 +22,8 @@
 #![no_std]
 
 pub mod drivers;
+
+/// The listing of the repository's front page.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+mod front_page {}

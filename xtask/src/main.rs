@@ -167,7 +167,11 @@ const STEPS: &[Step] = &[
     Step::manual("book-chapters", "Adapt the book's pages: mdBook calls it", steps::book::chapters).accepting(&[Rest]),
     Step::manual("safety", "Fly the campaigns of docs/explain/safety.md and write their tables", steps::safety::run)
         .accepting(&[Rest]),
-    Step::manual("figures", "Measure the README's figures and write them there", steps::figures::run),
+    Step::manual(
+        "figures",
+        "Measure the figures of docs/reference/figures.md and write them there",
+        steps::figures::run,
+    ),
 ];
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! `figures`: prints the README's figures, each from the command that measures it, and writes them there.
+//! `figures`: prints the campaigns of `docs/reference/figures.md`, each from its command, and writes them there.
 //!
 //! Takes some minutes. Not part of `ci`: figures are read by people, and the bars they must meet are tests.
 
@@ -7,6 +7,8 @@ use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, capture};
 use std::fmt::Write;
 
+/// The document the tables are written into, and where.
+const DOCUMENT: &str = "docs/reference/figures.md";
 const BEGIN: &str = "<!-- figures: cargo xtask figures -->\n";
 const END: &str = "<!-- end of figures -->";
 
@@ -26,8 +28,30 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let mut text = String::new();
     for (title, arguments) in CAMPAIGNS {
         let (table, _) = capture(repository.command(&program.to_string_lossy()).args(*arguments))?;
-        let _ = write!(text, "{title}: `stampfly {}`\n\n```text\n{table}```\n\n", arguments.join(" "));
+        let _ =
+            write!(text, "{title}: `stampfly {}`\n\n```text\n{}```\n\n", arguments.join(" "), without_speed(&table));
     }
     print!("{text}");
-    repository.fill("README.md", BEGIN, END, &text)
+    repository.fill(DOCUMENT, BEGIN, END, &text)
+}
+
+/// A table without its speed, which depends on the machine; `cargo xtask bars` measures that.
+fn without_speed(table: &str) -> String {
+    let kept = |line: &str| {
+        line.strip_suffix(" cores")
+            .and_then(|line| line.rsplit_once("; "))
+            .map_or(line.to_owned(), |(kept, _)| kept.to_owned())
+    };
+    table.lines().map(|line| kept(line) + "\n").collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_speed;
+
+    #[test]
+    fn only_the_speed_is_left_out() {
+        let table = "a 1; b\n\n9 of 9 flights succeeded; 70 × real time on 2 cores\n";
+        assert_eq!(without_speed(table), "a 1; b\n\n9 of 9 flights succeeded\n");
+    }
 }

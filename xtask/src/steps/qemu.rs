@@ -21,7 +21,7 @@ pub const PACKAGE: &str = "stampfly-board/qemu";
 const FIRMWARE: &str = "stampfly-board/esp32s3/Cargo.toml";
 const BUDGET: &str = "stampfly-board/qemu/budget.toml";
 /// The document the table is written into, and where.
-const DOCUMENT: &str = "README.md";
+const DOCUMENT: &str = "docs/reference/figures.md";
 const BEGIN: &str = "<!-- instructions: cargo xtask qemu --fix -->\n";
 const END: &str = "<!-- end of instructions -->";
 /// A run takes some seconds. One that faulted would never end.
