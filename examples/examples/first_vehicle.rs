@@ -1,7 +1,7 @@
-//! A quadcopter of one's own, from its mass to a hover a metre above the floor: the program of the tutorial `docs/guide/tutorial.md`.
+//! The program of the tutorial `docs/guide/tutorial.md`: a quadcopter from its mass to a hover a metre above the floor.
 //!
-//! It stands still until its sensors are calibrated, climbs, flies a step to the north and holds its place. The flight is logged and
-//! flown again from the log, bit for bit.
+//! It stands still until its sensors are calibrated, climbs, flies half a metre north and hovers. The flight is logged and computed
+//! again from the log, bit for bit.
 
 use serde::{Deserialize, Serialize};
 use stampfly_bus::{Activation, Duration, Instant, Runnable};
@@ -18,13 +18,13 @@ use stampfly_types::Vec3;
 use stampfly_types::messages::*;
 
 // ANCHOR: airframe
-/// The vehicle: everything that the gains follow from.
+/// The airframe, from which gains and limits are derived.
 const AIRFRAME: Airframe = Airframe {
     mass: 0.05,
     inertia: Vec3::new(2.0e-5, 2.5e-5, 4.0e-5),
-    // Four rotors in an X, each 3 cm to the side and 3 cm ahead or behind; their drag torque is 5 mm times their thrust.
+    // Four rotors in an X, 3 cm ahead or behind and 3 cm to the side; drag torque is 5 mm times thrust.
     rotors: &Rotor::quadrotor_x(0.03, 0.005),
-    // Volts that hold a rotor at a speed, and its thrust there.
+    // Voltage that holds a rotor speed, and thrust at that speed.
     motor: MotorCurve { ct: 1.5e-8, am: 7.0e-8, bm: 6.0e-4, cm: 0.02 },
     motor_lag: 0.02,
     motor_thrust_max: 0.2,
@@ -43,13 +43,13 @@ mod topics {
         sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [estimation];
         /// Distance to the floor.
         sensor_tof: TofData = ring(4) @ 30 Hz from range_finder => [estimation];
-        /// How the picture of the floor moves.
+        /// Optical flow.
         sensor_flow: FlowData = ring(4) @ 100 Hz from flow_sensor => [estimation];
-        /// Where the vehicle is, the newest.
+        /// Estimated state, the newest.
         estimate_state: StateEstimate = latest @ 400 Hz from estimation => [plan, control];
-        /// Where it should be, the newest.
+        /// Position to fly to, the newest.
         setpoint: Setpoint = latest @ 400 Hz from plan => [control];
-        /// What the motors do, the newest.
+        /// Motor duties, the newest.
         actuator_motor: MotorOutput = latest @ 400 Hz from control => [motors];
     }
 }
@@ -61,11 +61,11 @@ stampfly_bus::schedule! {
     #[derive(Clone, Serialize, Deserialize)]
     struct Vehicle on topics from Airframe;
 
-    /// Where am I?
+    /// State estimation.
     estimation = Estimation: on sensor_imu, flight, 300 us;
-    /// Where do I want to be?
+    /// Set-point.
     plan = Plan: after estimation, flight, 20 us;
-    /// How do I get there?
+    /// Control and mixing.
     control = Control: after plan, flight, 100 us;
 }
 // ANCHOR_END: schedule
@@ -90,7 +90,7 @@ impl Runnable for Estimation {
     fn run(&mut self, activation: &mut Activation, ends: &mut Self::Ends<'_>) {
         if !self.calibration.result().complete {
             for sample in ends.sensor_imu.iter() {
-                // A sample in motion does not count; it begins again by itself.
+                // A sample in motion restarts the calibration.
                 _ = self.calibration.step(sample.at, &sample.data);
             }
             if self.calibration.result().complete {
@@ -110,7 +110,7 @@ impl Runnable for Estimation {
 // ANCHOR_END: estimation
 
 // ANCHOR: plan
-/// Climbs to a metre as soon as there is an estimate, and goes half a metre north five seconds later.
+/// Climbs to a metre once the estimate is valid, and flies half a metre north five seconds later.
 #[derive(Clone, Serialize, Deserialize)]
 struct Plan {
     begun: Option<Instant>,
@@ -146,7 +146,7 @@ impl Runnable for Plan {
 // ANCHOR_END: plan
 
 // ANCHOR: control
-/// From the place and the wish to the duty of each motor.
+/// Computes motor duties from estimate and set-point.
 #[derive(Clone, Serialize, Deserialize)]
 struct Control {
     controller: CascadeController,
@@ -194,7 +194,7 @@ impl Runnable for Control {
         );
         let mixed = self.mixer.mix(&demand);
         self.unmet = mixed.unmet;
-        // The battery is not measured here.
+        // No battery voltage: this vehicle does not measure it.
         ends.actuator_motor.publish(now, &self.motors.step(now, &mixed, None, armed));
     }
 }
@@ -212,7 +212,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let Simulation { clock, world, sensors } = Simulation::new(&SimulationConfig::example());
     let (mut gyros, mut range, mut camera, mut rotors) = (sensors.imu, sensors.tof, sensors.flow, sensors.motors);
     let mut tasks = Tasks::new(clock.clone());
-    // One task a sensor, as on a microcontroller. Replace these three by your drivers, and the loop below by a timer.
+    // One task per sensor, as on a microcontroller. Replace the three by your drivers, and the loop below by a timer.
     tasks.spawn(async move {
         loop {
             let Ok(sample) = gyros.next().await;

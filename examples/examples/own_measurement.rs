@@ -1,4 +1,4 @@
-//! A sensor that the estimator does not know: distances to two radio beacons, a fifth of a second late. For `docs/guide/measurement.md`.
+//! A sensor that the estimator does not know: distances to two radio beacons, a fifth of a second late. For `docs/guide/estimator.md`.
 //!
 //! The vehicle stands three metres from where its estimator believes it to be. The distances put it right.
 
@@ -16,7 +16,7 @@ const SIGMA: f32 = 0.3;
 const LATE: Duration = Duration::from_millis(200);
 
 // ANCHOR: model
-/// What the sensor should read in this state, and how that changes with the state's position.
+/// Predicted reading in this state, and its derivatives by position.
 fn distance(state: &NominalState, beacon: Vec3) -> [Row; 1] {
     let away = state.position - beacon;
     let distance = away.norm().max(0.1);
@@ -39,7 +39,7 @@ fn main() {
             let beacon = BEACONS[usize::from(step % 40 == 0)];
             let reading = (TRUTH - beacon).norm();
             // ANCHOR: fuse
-            // The stamp is of when the distance was measured.
+            // The time at which the distance was measured.
             let at = Instant::from_micros(now.as_micros() - LATE.as_micros());
             match eskf.fuse(at, |state| distance(state, beacon), [reading], [SIGMA * SIGMA], 5.0) {
                 Fusion::Refused(reason) => println!("refused: {reason:?}"),

@@ -1,4 +1,4 @@
-//! A hexacopter of 1.8 kg from its mass, inertia and motors alone: for `docs/guide/multirotor.md`.
+//! A hexacopter of 1.8 kg from its mass, inertia and motors alone: for `docs/guide/controller.md`.
 
 use stampfly_control::{
     Airframe, CascadeConfig, Mixer, MotorConfig, MotorCurve, MotorStage, MultirotorMixer, Rotor, Spin,

@@ -1,6 +1,7 @@
 //! A delivery robot from the crates alone: two wheels, a gyroscope, a satellite receiver. For `docs/guide/own-vehicle.md`.
 //!
-//! It stands facing north until it sees its satellites, drives round two corners and stops. Its log is driven again, bit for bit.
+//! It stands facing north until the receiver has a fix, drives round two corners and stops. The drive is computed again from its log,
+//! bit for bit.
 
 // ANCHOR: tables
 use serde::{Deserialize, Serialize};
@@ -14,15 +15,15 @@ use stampfly_sim::sensors::{GnssConfig, GnssModel};
 use stampfly_sim::{Simulation, time::Tasks};
 use stampfly_types::{Origin, Vec3, frame, math, messages::*};
 
-/// Half a metre from wheel to wheel, 2 m/s at full power.
+/// Track 0.5 m, 2 m/s at full power.
 const CHASSIS: Differential = Differential { track: 0.5, speed_max: 2.0 };
-/// Where it starts.
+/// The start.
 const DEPOT: Origin = Origin { latitude: 365_440_000, longitude: 1_367_050_000, altitude: 30_000 };
-/// Where it goes, metres north and east of the depot.
+/// The corners of its route, metres north and east of the depot.
 const ROUTE: [Vec3; 3] = [Vec3::new(20.0, 0.0, 0.0), Vec3::new(20.0, 15.0, 0.0), Vec3::new(5.0, 15.0, 0.0)];
 
 message! {
-    /// How fast the wheels roll, or are to roll.
+    /// Speeds of the wheels, measured or commanded.
     pub struct Wheels {
         /// Left and right.
         speed: [f32; 2] ["m/s"],
@@ -39,11 +40,11 @@ mod topics {
         sensor_imu: ImuData = ring(16) @ 400 Hz from imu => [localisation];
         /// Position and velocity from satellites.
         sensor_gnss: GnssData = ring(4) @ 5 Hz from receiver => [localisation];
-        /// What the wheels do.
+        /// Measured wheel speeds.
         sensor_wheels: Wheels = ring(4) @ 50 Hz from encoders => [localisation];
-        /// Where the robot is, the newest.
+        /// Estimated state, the newest.
         estimate_state: StateEstimate = latest @ 400 Hz from localisation => [pilot];
-        /// What the wheels are to do, the newest.
+        /// Commanded wheel speeds, the newest.
         actuator_wheels: Wheels = latest @ 50 Hz from pilot => [motors];
     }
 }
@@ -53,15 +54,15 @@ stampfly_bus::schedule! {
     #[derive(Clone, Serialize, Deserialize)]
     struct Robot on topics from EskfConfig;
 
-    /// Where am I?
+    /// State estimation.
     localisation = Localisation: on sensor_imu, flight, 300 us;
-    /// How do I get where I want to be?
+    /// Guidance and control.
     pilot = Pilot: every 20 ms, background, 50 us;
 }
 // ANCHOR_END: tables
 
 // ANCHOR: localisation
-/// Learns the gyroscope's zero while it stands; after that it makes one estimate of three sensors.
+/// Calibrates the gyroscope while the robot stands still, then fuses three sensors.
 #[derive(Clone, Serialize, Deserialize)]
 struct Localisation {
     calibration: StillCalibration,
@@ -86,7 +87,7 @@ impl Runnable for Localisation {
             }
         }
         for sample in ends.sensor_wheels.iter() {
-            // It moves as its wheels roll, neither sideways nor up, to 5 cm/s. What contradicts the rest is left out.
+            // The body moves as the wheels roll, not sideways and not up; sigma 5 cm/s, gate 5 sigma.
             let [left, right] = sample.data.speed;
             _ = self.estimator.fuse(sample.at, velocity::body, [0.5 * (left + right), 0.0, 0.0], [0.0025; 3], 5.0);
         }
@@ -99,7 +100,7 @@ impl Runnable for Localisation {
 // ANCHOR_END: localisation
 
 // ANCHOR: pilot
-/// Turns to the next corner, drives there, and stands at the last one. Knows how many it has passed.
+/// Drives to the next corner and stops at the last one. The field counts the corners passed.
 #[derive(Clone, Serialize, Deserialize)]
 struct Pilot(usize);
 
@@ -128,7 +129,7 @@ impl Runnable for Pilot {
 // ANCHOR_END: pilot
 
 // ANCHOR: body
-/// The robot in simulation: how fast its wheels roll, left and right, and how fast they are told to.
+/// The simulated robot: wheel speeds left and right, and commanded wheel speeds.
 #[derive(Debug, Default)]
 struct Chassis {
     motion: Motion,
@@ -140,7 +141,7 @@ impl Body for Chassis {
     fn step(&mut self) {
         let dt = STEP.seconds_f64();
         for (wheel, told) in self.wheels.iter_mut().zip(self.told) {
-            // Its motor needs a tenth of a second.
+            // Motor lag 0.1 s.
             *wheel += (told - *wheel) * dt / 0.1;
         }
         let [left, right] = self.wheels;
@@ -194,7 +195,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let again = replay::<Robot>(&log, config, |_, _, _| true, ReplayOptions::default())?;
     let beside = (world.truth_at(clock.now()).position - ROUTE[2]).horizontal().norm();
     println!("{beside:.1} m beside the goal; {} samples again, different: {:?}", again.samples, again.difference);
-    // The receiver's error is some two metres.
+    // The receiver's error is about two metres.
     if again.difference.is_none() && beside < 3.0 { Ok(()) } else { Err("not there, or not the same".into()) }
 }
 // ANCHOR_END: main

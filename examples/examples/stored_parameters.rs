@@ -1,17 +1,17 @@
-//! Parameters that survive a restart, and one that is refused: for `docs/guide/stored-parameters.md`.
+//! Parameters that survive a restart, and one that is refused: for `docs/guide/own-vehicle.md`.
 
 use stampfly_param::types::messages::FlightStatus;
 use stampfly_param::{Disarmed, RamFlash, blocking::ParameterStore};
 
 fn main() {
     // ANCHOR: open
-    // On a chip this is its flash, here it is memory: four pages of 4 kB.
+    // In memory here, on a chip its flash: four pages of 4 kB.
     let flash = RamFlash::<0x4000>::new();
     let mut store = ParameterStore::open(flash, 0..0x4000).expect("three whole pages or more");
     // ANCHOR_END: open
 
     // ANCHOR: save
-    // From the mode machine: nobody who is armed can write.
+    // The status comes from the mode machine; an armed vehicle gives no proof.
     let status = FlightStatus::default();
     let disarmed = || Disarmed::proven_by(&status).expect("it stands on a table");
     store.save_within(disarmed(), "attitude.kp", 7.5_f32, 0.5..=20.0).expect("in range");

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Whichever wires it hangs on.
+/// Prints samples of a barometer on either bus.
 fn show<E: Error + 'static>(mut barometer: impl Barometer<Error = E>) -> Result<(), Box<dyn Error>> {
     loop {
         let sample = block_on(barometer.next())?;
