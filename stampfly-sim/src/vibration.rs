@@ -7,7 +7,7 @@
 //!
 //! It is sampled at the chip's own rate and before any decimation, so what folds back below the control loop's
 //! Nyquist frequency is real folding, at frequencies that follow the rotors. The amplitudes are fitted to recorded
-//! flights; `cargo run --release -p stampfly-host --example spectra` repeats the comparison.
+//! flights; `cargo run --release -p stampfly-lab --example spectra` repeats the comparison.
 
 use crate::noise::Noise;
 use crate::normals::Normals;
