@@ -61,6 +61,7 @@ stampfly_flight::parameter_table! { VehicleConfig, check = |config, about| {
 
     "eskf.process.gyro_noise" [1e-5, 0.03] "rad/s/sqrt(Hz)" eskf.gyro_noise => "gyro noise density";
     "eskf.process.accel_noise" [1e-4, 10.0] "m/s^2/sqrt(Hz)" eskf.accel_noise => "accelerometer noise density";
+    "eskf.process.accel_vibration" [0.0, 10.0] "1" eskf.accel_vibration => "share of vibration that is accelerometer noise";
     "eskf.process.gyro_bias_walk" [0.0, 0.1] "rad/s/sqrt(s)" eskf.gyro_bias_walk => "gyro bias random walk";
     "eskf.process.accel_bias_walk" [0.0, 0.3] "m/s^2/sqrt(s)" eskf.accel_bias_walk => "accelerometer bias random walk";
     "eskf.obs.tof_noise" [1e-3, 0.3] "m" eskf.tof_sigma => "range noise";
