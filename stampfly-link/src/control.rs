@@ -193,6 +193,13 @@ impl ControlPacket {
     /// out. Sticks that are not finite count as let go; others are clamped to ±1.
     #[must_use]
     pub fn from_pilot(vehicle: Address, input: &PilotInput) -> Self {
+        // A mode without a bit of its own would arrive as STABILIZE, in which throttle is thrust.
+        let [acro, hold_height, hold_place] = match input.mode {
+            FlightMode::Acro => [true, false, false],
+            FlightMode::Stabilize => [false; 3],
+            FlightMode::AltHold => [false, true, false],
+            FlightMode::PosHold => [false, false, true],
+        };
         Self {
             vehicle: vehicle.tail(),
             throttle: counts(input.throttle),
@@ -201,9 +208,9 @@ impl ControlPacket {
             yaw: counts(input.yaw),
             arm: input.arm,
             flip: false,
-            acro: input.mode == FlightMode::Acro,
-            hold_height: input.mode == FlightMode::AltHold,
-            hold_place: input.mode == FlightMode::PosHold,
+            acro,
+            hold_height,
+            hold_place,
         }
     }
 }

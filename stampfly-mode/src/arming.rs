@@ -96,7 +96,7 @@ checks! {
     NO_BARO [""] "no air pressure, in a mode that holds height" => |config, state, facts|
         when(holds_height(state) && facts.alerts.contains(Alerts::BARO_LOST));
     NO_FLOW [""] "no optical flow, in POS_HOLD" => |config, state, facts|
-        when(state.wanted == FlightMode::PosHold && facts.alerts.contains(Alerts::FLOW_LOST));
+        when(state.wanted.holds_place() && facts.alerts.contains(Alerts::FLOW_LOST));
     MOTOR [""] "a motor turns, as the battery's current shows" => |config, state, facts|
         when(facts.alerts.contains(Alerts::MOTOR_RUNS));
     NO_BATTERY [""] "powered from USB" => |config, state, facts| when(facts.alerts.contains(Alerts::USB_POWER));

@@ -190,7 +190,7 @@ fn choose_mode(config: &ModeConfig, state: &mut State, facts: &Facts) {
     let blind = blind && !state.mode.is_manual() && is_airborne(state.phase);
     state.blind = blind.then(|| state.blind.unwrap_or(facts.now));
     // A program does not see where the vehicle drifts; a pilot does, and has sticks.
-    let adrift = state.wanted == FlightMode::PosHold && state.mode != FlightMode::PosHold;
+    let adrift = state.wanted.holds_place() && !state.mode.holds_place();
     let adrift = adrift && state.commander != CommandSource::Pilot && is_airborne(state.phase);
     state.adrift = adrift.then(|| state.adrift.unwrap_or(facts.now));
     // No throttle is one at rest.
@@ -272,7 +272,7 @@ fn happens(event: Event, config: &ModeConfig, was_manual: bool, state: &State, f
             let rises = facts.known_height().is_none_or(|height| height > config.standing_height);
             facts.takeoff_complete
                 || (state.mode.is_manual() && facts.contact == GroundContact::Air && rises)
-                || (state.mode == FlightMode::Acro && waited(ACRO_TAKE_OFF))
+                || (state.mode.commands_rates() && waited(ACRO_TAKE_OFF))
         }
         Event::TakeOff => {
             let piloted = state.commander == CommandSource::Pilot && facts.sticks == CommandSource::Pilot;

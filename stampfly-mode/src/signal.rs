@@ -121,10 +121,7 @@ impl Signaller {
         let body = [
             (low, CYAN, Blink::Fast),
             (mode.phase == FlightPhase::Init, WHITE, Blink::Solid),
-            (mode.mode == FlightMode::Acro, BLUE, rhythm),
-            (mode.mode == FlightMode::Stabilize, LIME, rhythm),
-            (mode.mode == FlightMode::AltHold, ORANGE, rhythm),
-            (mode.mode == FlightMode::PosHold, MAGENTA, rhythm),
+            (true, colour(mode.mode), rhythm),
         ];
         Signal { status: first(&status, now), body: first(&body, now), tone: self.tone, tone_count: self.tone_count }
     }
@@ -134,6 +131,16 @@ impl Signaller {
             self.tone = tone;
             self.tone_count = self.tone_count.wrapping_add(1);
         }
+    }
+}
+
+/// The colour of a flight mode.
+const fn colour(mode: FlightMode) -> Colour {
+    match mode {
+        FlightMode::Acro => BLUE,
+        FlightMode::Stabilize => LIME,
+        FlightMode::AltHold => ORANGE,
+        FlightMode::PosHold => MAGENTA,
     }
 }
 

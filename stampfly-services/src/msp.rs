@@ -14,7 +14,7 @@ use core::f32::consts::PI;
 use heapless::Vec;
 use stampfly_flight::parameters::{self, Parameters};
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame};
-use stampfly_types::messages::{FlightMode, FlightStatus};
+use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Duration, Instant, frame};
 
 /// The longest question that is understood: a `SET_PID` of Betaflight with all its rows has 30 bytes of payload.
@@ -308,7 +308,7 @@ fn state(card: &Card, id: u16, status: &FlightStatus, cockpit: &dyn Cockpit) -> 
             let there =
                 [view.imu().is_some(), view.baro().is_some(), view.mag().is_some(), false, view.tof().is_some()];
             let sensors = there.iter().rev().fold(0, |bits, is| bits << 1 | u16::from(*is));
-            let boxes = u32::from(status.armed) | u32::from(status.mode != FlightMode::Acro) << 1;
+            let boxes = u32::from(status.armed) | u32::from(!status.mode.commands_rates()) << 1;
             let short = empty.u16(card.cycle).u16(0).u16(sensors).u32(boxes).u8(0);
             if id == 101 {
                 return Some(short);
@@ -332,7 +332,7 @@ fn state(card: &Card, id: u16, status: &FlightStatus, cockpit: &dyn Cockpit) -> 
         }
         105 => {
             let sticks = view.pilot().map(|(_, input)| input).unwrap_or_default();
-            let angle = sticks.mode != FlightMode::Acro;
+            let angle = !sticks.mode.commands_rates();
             let switches = [sticks.arm, angle, sticks.kill].map(|is_on| if is_on { 1.0 } else { -1.0 });
             let all = [sticks.roll, sticks.pitch, sticks.yaw, sticks.throttle].into_iter().chain(switches);
             all.chain([-1.0]).fold(empty, |pulses, stick| pulses.u16(pulse(stick)))

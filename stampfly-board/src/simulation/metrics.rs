@@ -15,7 +15,7 @@
 
 use serde::Serialize;
 use stampfly_sim::{Rms, Truth};
-use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus, Setpoint, StateEstimate};
+use stampfly_types::messages::{FlightPhase, FlightStatus, Setpoint, StateEstimate};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
 /// One instant of a flight.
@@ -118,7 +118,7 @@ impl Collector {
     /// Takes one instant. Call at the control rate.
     pub fn add(&mut self, now: &Snapshot<'_>) {
         let Snapshot { at, truth, setpoint, estimate, flight_status } = *now;
-        let holding = flight_status.phase == FlightPhase::Flying && flight_status.mode == FlightMode::PosHold;
+        let holding = flight_status.phase == FlightPhase::Flying && flight_status.mode.holds_place();
         match flight_status.phase {
             FlightPhase::TakeOff => {
                 self.flew = true;

@@ -219,7 +219,7 @@ impl<'b> Pilot<'b> {
     /// mode in which it only holds its height.
     fn mistrust(&mut self, place: Vec3, seen: &Seen, now: Instant) {
         let error = (place - seen.position).horizontal();
-        let lost = self.flown() == FlightMode::PosHold && error.norm() > LOST && error.dot(&seen.velocity) < 0.0;
+        let lost = self.flown().holds_place() && error.norm() > LOST && error.dot(&seen.velocity) < 0.0;
         let since = if lost { *self.lost.get_or_insert(now) } else { now };
         self.lost = self.lost.filter(|_| lost);
         if now.since(since) >= LOST_FOR {
@@ -338,7 +338,7 @@ impl<'b> Pilot<'b> {
         let velocity = frame::from_yaw(-seen.yaw) * seen.velocity;
         let limit = |speed: f32, most: f32| speed.clamp(-most, most);
 
-        for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]).filter(|_| mode != FlightMode::PosHold) {
+        for (trim, error) in self.lean_trim.iter_mut().zip([error.x, error.y]).filter(|_| !mode.holds_place()) {
             *trim = limit(*trim + LEARNS * PERIOD.seconds() * limit(error, 0.5), 0.2);
         }
         let axes = [
@@ -360,7 +360,7 @@ impl<'b> Pilot<'b> {
                 3.0 * (limit(wanted + trim, 0.3) - lean) / self.meaning.tilt_rate
             }
         });
-        let turn = if mode == FlightMode::PosHold { self.meaning.navigator.turn_rate } else { self.meaning.yaw_rate };
+        let turn = if mode.holds_place() { self.meaning.navigator.turn_rate } else { self.meaning.yaw_rate };
         let climb = if sinks { -CLIMB } else { limit(-0.8 * error.z, CLIMB) };
         let throttle = if mode.is_manual() && !sinks && -seen.position.z < CLEAR {
             // Off the ground quickly: what still touches it tips the vehicle over.

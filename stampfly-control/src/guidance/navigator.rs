@@ -323,7 +323,7 @@ impl Navigator {
     /// Position hold steers with the sticks or stays; the other modes lean with them, and stay while there is no pilot.
     fn horizontal_axes(&mut self, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let piloted = input.command.source == CommandSource::Pilot;
-        if input.flight_status.mode != FlightMode::PosHold && piloted {
+        if !input.flight_status.mode.holds_place() && piloted {
             self.follow_horizontally(input);
             return SetpointAxes::NONE;
         }
@@ -333,7 +333,7 @@ impl Navigator {
 
     fn fly(&mut self, now: Instant, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
         let guided = input.command.source == CommandSource::Guided;
-        if !(guided && input.flight_status.mode == FlightMode::PosHold) {
+        if !(guided && input.flight_status.mode.holds_place()) {
             // A leg is a plan from where the path was; once something else has moved it, the plan is void.
             self.leg = None;
             self.reached_at = None;
@@ -343,7 +343,7 @@ impl Navigator {
                 self.steer_heading(input, dt);
                 self.follow_horizontally(input);
                 self.follow_vertically(input);
-                if input.flight_status.mode == FlightMode::Acro {
+                if input.flight_status.mode.commands_rates() {
                     self.path.face(frame::yaw(&input.estimate.attitude));
                     return SetpointAxes::NONE;
                 }
@@ -393,7 +393,7 @@ impl Navigator {
     /// While it turns over, the path waits where it was: the vehicle comes back to it. In altitude hold it has drifted, and may stay
     /// where it comes out.
     fn hold(&mut self, input: &NavigatorInput<'_>, dt: f32) -> SetpointAxes {
-        if input.flight_status.mode == FlightMode::PosHold {
+        if input.flight_status.mode.holds_place() {
             self.path.drift(0.0, 0.0, dt);
         } else {
             self.follow_horizontally(input);

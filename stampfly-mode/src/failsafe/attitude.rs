@@ -68,7 +68,7 @@ impl AttitudeMonitor {
         let tips = known && self.tips(config, input, weak);
         let level = known && frame::cos_tilt(&estimate.attitude) >= self.cos_tumble;
         let by_acro =
-            matches!(status.phase, FlightPhase::Flying | FlightPhase::Landing) && status.mode == FlightMode::Acro;
+            matches!(status.phase, FlightPhase::Flying | FlightPhase::Landing) && status.mode.commands_rates();
         let turns_over = by_acro || status.phase == FlightPhase::Flip;
         self.turned_over = !level && (self.turned_over || turns_over);
         let limit = match (status.phase, status.mode) {

@@ -56,6 +56,24 @@ impl FlightMode {
             Self::AltHold | Self::PosHold => false,
         }
     }
+
+    /// Do the sticks command rates? In the other modes released sticks level the vehicle.
+    #[must_use]
+    pub const fn commands_rates(self) -> bool {
+        match self {
+            Self::Acro => true,
+            Self::Stabilize | Self::AltHold | Self::PosHold => false,
+        }
+    }
+
+    /// Does the vehicle hold its place when the sticks are released?
+    #[must_use]
+    pub const fn holds_place(self) -> bool {
+        match self {
+            Self::PosHold => true,
+            Self::Acro | Self::Stabilize | Self::AltHold => false,
+        }
+    }
 }
 
 message_flags! {

@@ -207,8 +207,8 @@ impl Interventions {
                 self.note(at, "land", listed(common(self.alerts, UNKNOWN)), !blind);
             }
         } else if phase == FlightPhase::Flying && left == phase {
-            let weaker = before.mode == FlightMode::PosHold && mode == FlightMode::AltHold;
-            let wanted = !self.heard || self.pilot.mode == FlightMode::PosHold;
+            let weaker = before.mode.holds_place() && mode == FlightMode::AltHold;
+            let wanted = !self.heard || self.pilot.mode.holds_place();
             if weaker && wanted && !recent(self.turned) {
                 self.note(at, "mode", listed(common(self.alerts, UNKNOWN)), !blind);
             }

@@ -217,7 +217,7 @@ impl Judge {
             moments: Moments::default(),
             wide: match pilot {
                 None => 1.0,
-                Some(mode) if course.modes().chain([mode]).all(|mode| mode == FlightMode::PosHold) => PILOT,
+                Some(mode) if course.modes().chain([mode]).all(|mode| mode.holds_place()) => PILOT,
                 Some(_) => BY_SIGHT,
             },
             course,

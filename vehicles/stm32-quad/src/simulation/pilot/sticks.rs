@@ -61,7 +61,7 @@ fn name_of(mode: FlightMode) -> &'static str {
 /// The sticks of a row as this transmitter has them.
 fn transmitted(input: &PilotInput) -> Transmitted {
     let PilotInput { roll, pitch, yaw, throttle, mode, .. } = *input;
-    Transmitted { roll, pitch: -pitch, yaw, throttle: 0.5 * (throttle + 1.0), acro: mode == FlightMode::Acro }
+    Transmitted { roll, pitch: -pitch, yaw, throttle: 0.5 * (throttle + 1.0), acro: mode.commands_rates() }
 }
 
 impl Pilot<'_> {
