@@ -168,6 +168,14 @@ fn hostile_numbers_become_harmless_packets() {
     assert_eq!((packet.roll, packet.pitch, packet.yaw), (2048, 0, 2048));
 }
 
+#[test]
+fn a_mode_is_received_as_one_whose_throttle_means_the_same() {
+    for &mode in FlightMode::ALL {
+        let sent = ControlPacket::from_pilot(VEHICLE, &PilotInput { mode, ..Default::default() });
+        assert_eq!(sent.pilot_input().mode.is_manual(), mode.is_manual(), "{mode:?}");
+    }
+}
+
 proptest! {
     #[test]
     fn control_round_trips(sticks in prop::array::uniform4(0u16..4096), switches in 0u8..32) {
