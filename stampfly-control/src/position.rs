@@ -44,9 +44,10 @@ impl PositionConfig {
 }
 
 impl Default for PositionConfig {
-    /// For an attitude loop of 13 1/s or more, whatever the vehicle weighs: the velocity loop has the
-    /// largest gain that [`ATTITUDE_SHARE`] allows it, the position loop half of that, which damps
-    /// the two together by 0.7. The integral takes the time of 3.6 such time constants.
+    /// For an attitude loop of 13 1/s or more, whatever the vehicle weighs: the velocity loop has three
+    /// tenths of that gain, the most that leaves the attitude time to follow, and the position loop
+    /// half of the velocity loop's, which damps the two together by 0.7. The integral takes 3.6 time
+    /// constants of the velocity loop.
     fn default() -> Self {
         Self {
             position_gain: 1.95,
