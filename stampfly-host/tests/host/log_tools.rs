@@ -189,7 +189,7 @@ mod again {
         }
         assert!(differing > 20, "{differing} columns");
         assert!(
-            reflown.apart.since_s.is_some_and(|since| since > 9.0) && reflown.apart.farthest_m > 0.02,
+            reflown.apart.since_s.is_some_and(|since| since > 9.0) && reflown.apart.farthest_m > 0.01,
             "{}",
             reflown
         );

@@ -99,8 +99,8 @@ fn four_times_the_vibration_still_lands() {
 
 /// The figures can tell a bad flight from a good one; if they could not, the bars above would prove nothing.
 #[test]
-fn four_times_the_gusts_break_the_bars() {
-    let flights = campaign(|setup| setup.simulation.wind.gust = 2.0);
+fn six_times_the_gusts_break_the_bars() {
+    let flights = campaign(|setup| setup.simulation.wind.gust = 3.0);
     for flight in &flights {
         let metrics = &flight.flown.outcome.metrics;
         assert!(metrics.hover_tilt_max_deg.is_some_and(|tilt| tilt > 5.0), "seed {}: {metrics:?}", flight.seed);

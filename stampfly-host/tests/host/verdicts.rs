@@ -46,7 +46,7 @@ const CASES: [Case; 5] = [
     Case {
         options: &["--seed", "880303", "--mission", "arm; takeoff 0.5; hover 2; goto 1 0 0.7; land", "--gust", "6"],
         outcome: "flown-away",
-        words: "above the highest height",
+        words: "beside the path",
     },
 ];
 
