@@ -6,9 +6,6 @@ use stampfly_flight::golden::{GoldenError, Report, Verdict, play};
 use stampfly_types::messages::SelfTestVerdict;
 use std::mem::MaybeUninit;
 
-/// In hexadecimal, written by `cargo xtask golden --fix`.
-const HASH: &str = include_str!("../../golden/hash");
-
 #[test]
 fn this_machine_publishes_the_recorded_bits() {
     let outcome = self_test(&mut MaybeUninit::uninit(), &mut Bus::new());
@@ -16,7 +13,8 @@ fn this_machine_publishes_the_recorded_bits() {
         Ok(report) => report,
         Err(error) => panic!("{error}: `cargo xtask golden --fix` records the flight again, if flights were to change"),
     };
-    assert_eq!((report.verdict, format!("{:016x}", report.hash)), (Verdict::Identical, HASH.trim().to_owned()));
+    // The record has the hash of all that was published when it was recorded.
+    assert_eq!(report.verdict, Verdict::Identical);
     assert!(outcome.may_fly());
     assert_eq!(outcome.message().verdict, SelfTestVerdict::Identical);
 }
