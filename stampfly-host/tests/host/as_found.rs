@@ -121,15 +121,16 @@ fn legal_parameters_that_did_not_fit_each_other() {
     }
 }
 
-/// The estimator takes a range that falls to half or more for a table, as it does for certain from
-/// 1.1 m over one of half a metre. It takes a shorter one for a phase that wraps: the barometer then holds the height, and `FLOW_IMPLAUSIBLE` stays off.
+/// The estimator takes a range that falls to half or more for a table. At 1.0 m half of the range is
+/// left, and noise decides: three of the seeds 13 to 20 are taken for a phase that wraps. It takes a shorter
+/// range for one always: the barometer then holds the height, and `FLOW_IMPLAUSIBLE` stays off.
 ///
 /// At 0.7 m, 0.2 m are left above the table, and the barometer is off by as much. Two of three
 /// vehicles touch the table, raise `IMPACT` or `MOTOR_WEAK`, and stop upright on it before the
 /// mission lands them.
 #[test]
 fn a_table_under_the_vehicle_does_not_accuse_the_flow() {
-    for height in ["0.7", "0.8", "0.9", "1.0", "1.1"] {
+    for height in ["0.7", "0.8", "0.9", "1.0", "1.05"] {
         let mut ended_well = 0;
         for seed in 13..=15 {
             let mission = format!("arm; takeoff {height}; hover 3; goto 1 0 {height}; hover 8; land");
@@ -140,7 +141,7 @@ fn a_table_under_the_vehicle_does_not_accuse_the_flow() {
             println!("{height} m, seed {seed}: {} {all:?}", judgement.outcome);
             flight.came_down();
             assert!(!all.contains(&"FLOW_IMPLAUSIBLE"), "{}: {all:?}", flight.what);
-            assert!(height != "1.1" || judgement.outcome == "transparent", "{}", flight.what);
+            assert!(height != "1.05" || judgement.outcome == "transparent", "{}", flight.what);
             assert!(["transparent", "degraded", "landed"].contains(&judgement.outcome), "{}", flight.what);
             ended_well += u32::from(flight.outcome.succeeded());
         }
