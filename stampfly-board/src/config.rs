@@ -108,7 +108,7 @@ impl Default for VehicleConfig {
             eskf: EskfConfig {
                 ground_clearance,
                 drag: (DRAG / MASS) as f32,
-                // Errors of scale and axes; vibration is told by the next one.
+                // Errors of scale and axes alone: vibration adds `accel_vibration`.
                 accel_noise: 0.05,
                 accel_vibration: ACCEL_VIBRATION,
                 ..EskfConfig::indoors()

@@ -2,7 +2,7 @@
 //!
 //! The emulated bus takes no time for software unless it is told to, so a deadline that leaves none would pass everywhere else. Here it is
 //! told. The order of size is that of code that no cache holds: a hundred lines of 32 bytes are 105 µs from flash over four wires at
-//! 80 MHz, and 380 µs over two at 40 MHz (`docs/explain/hardware-status.md`). How long it is on a StampFly nobody has measured.
+//! 80 MHz, and 380 µs over two at 40 MHz (`docs/explain/hardware-status.md`). It has not been measured on a StampFly.
 
 use stampfly_board::devices;
 use stampfly_board::simulation::sensing::SPI;
