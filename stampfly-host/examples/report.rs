@@ -1,11 +1,10 @@
-//! Makes a page of a flight, or of a recording, or of a made-up flight if no file is given:
+//! Makes a page of a logged flight, or of an invented one if no file is given:
 //!
 //! ```sh
-//! cargo run -p stampfly-host --example report -- out.html [FILE]
+//! cargo run -p stampfly-host --example report -- out.html [LOG]
 //! ```
 
-use stampfly_host::{Report, report::Metric};
-use stampfly_lab::{Flight, dataset, flight_log};
+use stampfly_host::{Flight, Report, flight_log, report::Metric};
 
 #[path = "../tests/host/made_up.rs"]
 mod made_up;
@@ -15,13 +14,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = arguments.next().unwrap_or_else(|| "flight.html".to_owned());
     let (title, subtitle, flight) = match arguments.next() {
         None => ("Figure eight".to_owned(), "a made-up flight of one minute".to_owned(), made_up::flight()),
-        Some(file) => match flight_log::load(&file) {
-            Ok(log) => (file, format!("{} places left out", log.omissions.len()), log.flight),
-            Err(_) => {
-                let recording = dataset::load(&file)?;
-                (recording.name.clone(), recording.kind.to_string(), recording.to_flight())
-            }
-        },
+        Some(file) => {
+            let log = flight_log::load(&file)?;
+            (file, format!("{} places left out", log.omissions.len()), log.flight)
+        }
     };
     let metrics = metrics(&flight);
     Report { title, subtitle, metrics, page: &stampfly_board::simulation::PAGE, flight: &flight }.write(&out)?;

@@ -8,6 +8,8 @@
 //! | [`campaign`] | many flights in parallel |
 //! | [`golden`] | a short flight to ask other machines whether they compute the same |
 //! | [`hil`] | hardware in the loop: a vehicle at the other end of a line flies the simulated world |
+//! | [`flight`] | a flight as columns over time, with units and names |
+//! | [`flight_log`] | a flight from a ULog file, of this stack or another one |
 //! | [`log`] | tools for logs: info, tables, MCAP, a part of one |
 //! | [`log_file`] | a log that grows while others read it |
 //! | [`serve`] | the ports at which other programs fly a simulated vehicle |
@@ -23,6 +25,8 @@ pub mod campaign;
 pub mod command_line;
 pub mod connect;
 pub mod doctor;
+pub mod flight;
+pub mod flight_log;
 pub mod flown;
 pub mod golden;
 pub mod ground;
@@ -35,6 +39,7 @@ pub mod serve;
 pub mod vehicles;
 mod waited;
 
+pub use flight::Flight;
 pub use report::Report;
 /// The log of a flight.
 pub use stampfly_sim::recorder;

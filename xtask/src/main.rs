@@ -76,6 +76,7 @@ const STEPS: &[Step] = &[
     // Every night.
     Step::nightly("thorough", "Run the tests that fly with all of their seeds", steps::test::thorough)
         .holding(&[Debug]),
+    Step::nightly("estimation", "Test the estimators on recorded flights", steps::estimation::run).accepting(&[Rest]),
     Step::nightly("alone", "Lint packages that are built by themselves", steps::clippy::alone).holding(&[Debug]),
     Step::nightly("each-feature", "Check each library with each feature alone, and with all", steps::features::each)
         .holding(&[Debug]),

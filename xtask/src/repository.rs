@@ -9,7 +9,7 @@ use toml_edit::{DocumentMut, Item};
 pub type Failure = String;
 
 /// Published libraries for a PC. Every other one has to build for bare metal.
-const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-ground", "stampfly-host", "stampfly-lab", "stampfly-sim"];
+const HOST_ONLY: &[&str] = &["stampfly-bus-macros", "stampfly-ground", "stampfly-host", "stampfly-sim"];
 
 /// The working copy.
 pub struct Repository {

@@ -1,14 +1,12 @@
 //! The command line: what the program can do, and what several commands share. The options of a command are in the file of its kind.
 
 mod campaign;
-mod estimate;
 mod live;
 mod log;
 mod scene;
 mod sticks;
 
 pub use campaign::{CampaignOptions, Engine};
-pub use estimate::EstimateOptions;
 pub use live::{ConnectOptions, DemoOptions, HilOptions, ServeOptions, VehiclePlace};
 pub use log::{GoldenOptions, LogCommand, ReplayOptions};
 pub use scene::{FlyOptions, SceneOptions};
@@ -59,8 +57,6 @@ pub enum Command {
     Modes(ModesOptions),
     /// Fly many missions with different seeds and summarise them.
     Campaign(CampaignOptions),
-    /// Run the estimator over recorded sensor data and say how good it is.
-    Estimate(EstimateOptions),
     /// Hardware in the loop: fly a vehicle at the other end of a serial port through the simulated world.
     Hil(HilOptions),
     /// List the ports of a vehicle: what programs may do there, and what stops others.

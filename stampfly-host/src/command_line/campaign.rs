@@ -1,5 +1,4 @@
-//! `stampfly campaign`: many flights. Exit code 1 when one of them did not end as it should, or when the estimator's
-//! consistency was asked for and is outside its bars.
+//! `stampfly campaign`: many flights. Exit code 1 when one of them did not end as it should.
 
 use crate::campaign::parallel::workers;
 use crate::campaign::rate::Rate;
@@ -12,9 +11,7 @@ use crate::command_line::stick_campaign;
 use crate::command_line::terminal;
 use crate::vehicles::{self, ForVehicle};
 use serde_json::{Map, Value, json};
-use stampfly_board::simulation::StampFly;
-use stampfly_lab::consistency::{ABOVE, INSIDE, Line, Observation, Summary};
-use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
+use stampfly_sim::vehicle::{Vehicle, Verdict};
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -23,9 +20,6 @@ use std::time::Instant;
 const MOST_TOLD: usize = 20;
 
 pub fn run(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    if options.consistency {
-        return consistency(options);
-    }
     vehicles::with(&options.scene.vehicle.name, Campaign(options))?
 }
 
@@ -46,34 +40,14 @@ impl ForVehicle for Campaign<'_> {
         if options.faults {
             return fault_campaign::run::<V>(options);
         }
-        let (flights, factor) = fly_all::<V, ()>(options, &|_, _| ())?;
-        print::<V, ()>(options, &flights, factor, None);
+        let (flights, factor) = fly_all::<V>(options)?;
+        print(options, &flights, factor);
         Ok(if flights.iter().all(Flight::succeeded) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
 }
 
-/// Errors and innovations of the estimator over all flights: a question to the StampFly's.
-fn consistency(options: &CampaignOptions) -> Result<ExitCode, Failure> {
-    if options.scene.vehicle.name != StampFly::NAME {
-        return Err(format!("--consistency is for the estimator of {}", StampFly::NAME).into());
-    }
-    let observe = |seed: u64, setup: &<StampFly as Vehicle>::Setup| Observation::new(setup.vehicle.eskf, seed);
-    let (flights, factor) = fly_all::<StampFly, Observation>(options, &observe)?;
-    let succeeded = flights.iter().all(Flight::succeeded);
-    let (seen, flights): (Vec<_>, Vec<_>) = flights
-        .into_iter()
-        .map(|Flight { seed, flown, witness }| (witness.finish(), Flight::<StampFly, ()> { seed, flown, witness: () }))
-        .unzip();
-    let summary = Summary::of(&seen);
-    print::<StampFly, ()>(options, &flights, factor, Some(&summary));
-    Ok(if succeeded && summary.is_good() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
 /// Flies all of them, each with a seed of its own. Also returns simulated over wall time.
-fn fly_all<V: Vehicle, W: Witness<V::Runnables> + Send>(
-    options: &CampaignOptions,
-    witness: &(dyn Fn(u64, &V::Setup) -> W + Sync),
-) -> Result<(Vec<Flight<V, W>>, f64), Failure> {
+fn fly_all<V: Vehicle>(options: &CampaignOptions) -> Result<(Vec<Flight<V, ()>>, f64), Failure> {
     let setups: Result<Vec<_>, Failure> = (0..options.flights)
         .map(|index| {
             let nth = |name: &str, seed: u64| {
@@ -88,18 +62,13 @@ fn fly_all<V: Vehicle, W: Witness<V::Runnables> + Send>(
         .collect();
     let bar = terminal::bar(options.flights, "flying {wide_bar:.cyan} {pos}/{len} flights, {eta} left");
     let begun = Instant::now();
-    let flights = campaign::run::<V, W>(&setups?, witness, &|_| bar.inc(1));
+    let flights = campaign::run::<V, ()>(&setups?, &|_, _| (), &|_| bar.inc(1));
     bar.finish_and_clear();
     let simulated: f64 = flights.iter().map(|flight| flight.flown.duration.seconds_f64()).sum();
     Ok((flights, simulated / begun.elapsed().as_secs_f64()))
 }
 
-fn print<V: Vehicle, W>(
-    options: &CampaignOptions,
-    flights: &[Flight<V, W>],
-    factor: f64,
-    consistency: Option<&Summary>,
-) {
+fn print<V: Vehicle>(options: &CampaignOptions, flights: &[Flight<V, ()>], factor: f64) {
     let failed: Vec<u64> = flights.iter().filter(|flight| !flight.succeeded()).map(|flight| flight.seed).collect();
     let (all, succeeded) = (flights.len(), flights.len() - failed.len());
     if options.scene.json {
@@ -116,9 +85,6 @@ fn print<V: Vehicle, W>(
             object.insert(name.into(), json!(spread));
         }
         object.insert("each".into(), flights.iter().map(each).collect());
-        if let Some(summary) = consistency {
-            object.insert("consistency".into(), json!(summary));
-        }
         object.insert("realtime_factor".into(), json!(factor));
         outln!("{}", Value::Object(object));
         return;
@@ -141,13 +107,10 @@ fn print<V: Vehicle, W>(
     if failed.len() > MOST_TOLD {
         outln!("  and {} more; --json has all of them", failed.len() - MOST_TOLD);
     }
-    if let Some(summary) = consistency {
-        print_consistency(summary);
-    }
 }
 
 /// One flight, for scripts.
-fn each<V: Vehicle, W>(flight: &Flight<V, W>) -> Value {
+fn each<V: Vehicle>(flight: &Flight<V, ()>) -> Value {
     let mut object = Map::new();
     object.insert("seed".into(), json!(flight.seed));
     object.insert("succeeded".into(), json!(flight.succeeded()));
@@ -156,40 +119,10 @@ fn each<V: Vehicle, W>(flight: &Flight<V, W>) -> Value {
 }
 
 /// How many flights each of the vehicle's yes-or-no results held in.
-fn facts<V: Vehicle, W>(flights: &[Flight<V, W>]) -> BTreeMap<&'static str, usize> {
+fn facts<V: Vehicle>(flights: &[Flight<V, ()>]) -> BTreeMap<&'static str, usize> {
     let mut counts = BTreeMap::new();
     for (fact, holds) in flights.iter().flat_map(|flight| flight.flown.outcome.facts()) {
         *counts.entry(fact).or_default() += usize::from(holds);
     }
     counts
-}
-
-fn print_consistency(summary: &Summary) {
-    let print = |line: &Line| {
-        let [low, high] = line.band;
-        let mark = if line.is_good() { "" } else { "  OUTSIDE" };
-        let (name, freedom, mean) = (line.name, line.freedom, line.mean);
-        let [inside, above] = [line.inside, line.above].map(|share| 100.0 * share);
-        outln!("{name:<26} {freedom:>3} {mean:>8.2}   {low:>6.3} to {high:>6.2} {inside:>8.1} % {above:>6.1} %{mark}");
-    };
-    let head = ("error squared (NEES)", "dof", "mean", "95 % band", "inside", "above");
-    outln!("\n{:<26} {:>3} {:>8}   {:^16} {:>10} {:>8}", head.0, head.1, head.2, head.3, head.4, head.5);
-    summary.errors.iter().for_each(print);
-    outln!("{:<26}", "innovation squared (NIS)");
-    summary.innovations.iter().for_each(print);
-    outln!(
-        "\nmean: over flights; inside, above: share of flights at one random instant, at least {:.0} %, at most {:.0} %",
-        INSIDE * 100.0,
-        ABOVE * 100.0
-    );
-    outln!(
-        "{} resets after a lock-out, {} neither recovered nor reported, {} flights reported lost",
-        summary.resets,
-        summary.unresolved,
-        summary.diverged
-    );
-    match summary.different {
-        0 => outln!("estimates repeated bit for bit by a second estimator in every flight"),
-        different => outln!("{different} flights NOT repeated bit for bit by a second estimator"),
-    }
 }

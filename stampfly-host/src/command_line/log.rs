@@ -2,6 +2,8 @@
 
 use crate::command_line::arguments::LogCommand;
 use crate::command_line::failure::Failure;
+use crate::flight::Series;
+use crate::flight_log::{self, FlightLog, Omission};
 use crate::log::csv::{self, FileNames};
 use crate::log::info::{Info, omissions};
 use crate::log::{cut, mcap, record, refly};
@@ -10,8 +12,6 @@ use crate::vehicles::{self, ForVehicle};
 use serde_json::json;
 use stampfly_flight::compact::{Contents, Samples};
 use stampfly_flight::replay;
-use stampfly_lab::flight::Series;
-use stampfly_lab::flight_log::{self, FlightLog, Omission};
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::Instant;
 use std::fs::File;

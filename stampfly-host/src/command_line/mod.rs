@@ -21,7 +21,6 @@ mod doctor;
 mod doors;
 mod ended;
 mod engine;
-mod estimate;
 mod failure;
 mod fault_campaign;
 mod faults;
@@ -35,8 +34,11 @@ mod replay;
 mod schedule;
 mod serve;
 mod stick_campaign;
-mod terminal;
+pub mod terminal;
 mod topics;
+
+pub use arguments::SceneOptions;
+pub use failure::Failure;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -59,7 +61,6 @@ pub fn run() -> ExitCode {
         Command::Doctor(options) => doctor::run(&options),
         Command::Modes(_) => modes::run(),
         Command::Campaign(options) => campaign::run(&options),
-        Command::Estimate(options) => estimate::run(&options),
         Command::Hil(options) => hil::run(&options),
         Command::Doors(options) => doors::run(&options),
         Command::Key(command) => key::run(&command),

@@ -1,7 +1,7 @@
 //! A table a topic: time stamps in microseconds, then every number, with names as pyulog's `ulog2csv` writes them.
 
 use super::shown;
-use stampfly_lab::flight::{Column, Series};
+use crate::flight::{Column, Series};
 use stampfly_log::plain;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -56,7 +56,7 @@ impl FileNames {
 ///
 /// ```
 /// use stampfly_host::log::csv;
-/// use stampfly_lab::flight::Series;
+/// use stampfly_host::flight::Series;
 /// use stampfly_types::{Instant, Message, messages::PowerData};
 ///
 /// let mut series = Series::of_fields(PowerData::FIELDS);

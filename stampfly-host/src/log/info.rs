@@ -1,8 +1,8 @@
 //! What is in a log.
 
 use super::refly::{OPTIONS, options_of};
+use crate::flight_log::{FlightLog, Omission};
 use serde::Serialize;
-use stampfly_lab::flight_log::{FlightLog, Omission};
 use stampfly_log::plain;
 use stampfly_types::Instant;
 use std::collections::BTreeMap;
@@ -53,7 +53,7 @@ impl Info {
     ///
     /// ```
     /// use stampfly_host::log::info::Info;
-    /// use stampfly_lab::flight_log;
+    /// use stampfly_host::flight_log;
     /// use stampfly_log::ulog::{Definitions, Ram, Sample, Topic};
     /// use stampfly_types::{Instant, Message, messages::PowerData};
     ///

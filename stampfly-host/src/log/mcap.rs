@@ -3,8 +3,8 @@
 //! The container is the crate `mcap`'s. JSON is longer than ULog's bytes, and every viewer reads it
 //! without being told how; the ULog is shorter, and both programs open it as well.
 
+use crate::flight::{Flight, Series};
 use serde_json::{Map, Value, json};
-use stampfly_lab::flight::{Flight, Series};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};

@@ -5,12 +5,12 @@
 //! parameters and its states of before ([`change`](stampfly_sim::vehicle::change)), and the simulated world answers.
 //! The log of a board has no world that would answer; `stampfly replay` repeats what it computed.
 
+use crate::flight::{Column, Flight, Series};
+use crate::flight_log::{self, FlightLog};
 use crate::flown::{Flown, fly};
 use crate::report::{Metric, Report};
 use serde_json::{Value, json};
 use stampfly_bus::Schedule;
-use stampfly_lab::flight::{Column, Flight, Series};
-use stampfly_lab::flight_log::{self, FlightLog};
 use stampfly_log::ulog::{End, ReadError};
 use stampfly_sim::recorder::Recorder;
 use stampfly_sim::vehicle::change::{Change, ChangeError};

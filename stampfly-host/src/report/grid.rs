@@ -1,7 +1,7 @@
 //! One time axis for everything on the page, and numbers small enough to send.
 
+use crate::flight::Series;
 use serde::Serialize;
-use stampfly_lab::flight::Series;
 use stampfly_sim::vehicle::Pick;
 use stampfly_types::{Duration, Instant};
 

@@ -11,14 +11,14 @@ mod panels;
 
 pub use crate::page::Metric;
 
-use stampfly_lab::Flight;
+use crate::Flight;
 use stampfly_sim::vehicle::Page;
 
 /// What goes into a page.
 ///
 /// ```
 /// use stampfly_host::{Report, report::Metric};
-/// use stampfly_lab::Flight;
+/// use stampfly_host::Flight;
 /// use stampfly_board::simulation::PAGE;
 /// use stampfly_types::{Instant, messages::StateEstimate};
 ///

@@ -3,8 +3,8 @@
 //! Everything that depends on the flight is decided here; the script of the page only draws.
 
 use super::grid::{Channel, Grid};
+use crate::flight::{Column, Flight, Series};
 use serde::Serialize;
-use stampfly_lab::flight::{Column, Flight, Series};
 use stampfly_log::trace::TOPIC_PREFIX;
 use stampfly_sim::vehicle::{Motion, Observer, Page, PanelSpec, Pick};
 use stampfly_types::messages::SetpointAxes;

@@ -8,7 +8,7 @@ use stampfly_board::simulation::mission::{HOVER, Mission, REFERENCE};
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
-use stampfly_lab::{Flight, flight::Series, flight_log};
+use stampfly_host::{Flight, flight::Series, flight_log};
 use stampfly_types::{Duration, Instant};
 use std::collections::BTreeMap;
 

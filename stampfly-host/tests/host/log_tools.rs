@@ -4,8 +4,8 @@ use crate::flown::{HOP, Hop, hop};
 use crate::foreign_log::{message, px4_like};
 use crate::replay::replay;
 use serde_json::Value;
+use stampfly_host::flight_log;
 use stampfly_host::log::{csv, cut, info::Info, mcap};
-use stampfly_lab::flight_log;
 use stampfly_log::ulog::End;
 use stampfly_types::Instant;
 use std::io::Cursor;
@@ -115,10 +115,10 @@ fn tables_and_mcap_hold_what_the_log_holds() {
 mod again {
     use super::{HOP, Instant};
     use stampfly_board::simulation::StampFly;
+    use stampfly_host::flight::Series;
+    use stampfly_host::flight_log;
     use stampfly_host::flown::fly;
     use stampfly_host::log::refly::{Reflown, ReflyError, facts, refly};
-    use stampfly_lab::flight::Series;
-    use stampfly_lab::flight_log;
     use stampfly_sim::recorder::Recorder;
     use stampfly_sim::vehicle::change::ChangeError;
     use stampfly_sim::vehicle::{Options, Vehicle, Verdict};

@@ -1,6 +1,6 @@
 //! A flight that never was, to develop and to test the page with.
 
-use stampfly_lab::{Flight, flight::Event};
+use stampfly_host::{Flight, flight::Event};
 use stampfly_types::messages::{
     Alerts, ControlOutput, EstimatorStatus, FlightMode, FlightPhase, FlightStatus, ImuData, MotorOutput, PowerData,
     Setpoint, SetpointAxes, StateEstimate, SystemAlert, TofData,

@@ -7,9 +7,9 @@ use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Air, Setup, StampFly};
 use stampfly_flight::compact::{File, Samples};
 use stampfly_flight::replay::{ReplayOptions, replay};
+use stampfly_host::flight_log;
 use stampfly_host::flown::fly;
 use stampfly_host::log::record::{as_log, run_again};
-use stampfly_lab::flight_log;
 use stampfly_types::messages::FlightMode;
 use stampfly_types::{Duration, Instant};
 

@@ -2,8 +2,8 @@
 
 use crate::made_up;
 use serde_json::Value;
+use stampfly_host::Flight;
 use stampfly_host::{Report, report::Metric};
-use stampfly_lab::Flight;
 use stampfly_rover::simulation::Rover;
 use stampfly_sim::vehicle::Vehicle;
 use stampfly_types::{Instant, message, messages::PowerData};

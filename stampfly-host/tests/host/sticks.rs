@@ -131,7 +131,7 @@ fn a_log_has_the_rows_and_is_flown_again_without_the_file() {
     let mut recorder = Recorder::<StampFly>::with_log(&setup, &facts);
     fly::<StampFly>(&setup, &mut recorder, &mut |_, _| {});
     std::fs::remove_file(&file).expect("removed");
-    let info = Info::of(&stampfly_lab::flight_log::parse(recorder.log()).expect("a log"));
+    let info = Info::of(&stampfly_host::flight_log::parse(recorder.log()).expect("a log"));
     assert!(info.facts["flight_options"].len() > 2_048 && info.facts.keys().all(|name| !name.contains('/')));
     assert!(info.to_string().lines().all(|line| line.chars().count() < 500), "{info}");
     let replayed = crate::replay::replay(recorder.log()).expect("a log");

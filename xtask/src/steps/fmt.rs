@@ -4,7 +4,7 @@ use crate::arguments::Arguments;
 use crate::repository::{Failure, Repository, run as run_program};
 
 /// No members of the workspace.
-const OTHERS: [&str; 3] = ["fuzz", "stampfly-board/browser", "stampfly-board/panic-proof"];
+const OTHERS: [&str; 4] = ["fuzz", "lab", "stampfly-board/browser", "stampfly-board/panic-proof"];
 
 pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let all = run_program(repository.cargo().args(["fmt", "--all", "--check"]));

@@ -4,7 +4,7 @@
 
 use crate::arguments::Arguments;
 use crate::machine::{FOR_CI, exists, installing, missing};
-use crate::repository::{Failure, Repository, capture, in_ci, without_recorded_flights};
+use crate::repository::{Failure, Repository, capture};
 use std::process::{Command, Stdio};
 
 /// Programs that no step installs, and how to.
@@ -26,10 +26,6 @@ pub fn run(repository: &Repository, _: &Arguments) -> Result<(), Failure> {
     let programs = PROGRAMS.iter().filter(|(program, _)| !exists(program)).map(|(_, command)| *command);
     let parts = PARTS.iter().filter(|(test, _)| !works(repository, test)).map(|(_, command)| *command);
     let mut wanted: Vec<String> = programs.chain(parts).map(str::to_owned).collect();
-    // Elsewhere a test without them still means something.
-    if in_ci() && repository.data().is_none() && !without_recorded_flights() {
-        wanted.push("export STAMPFLY_DATA=the folder of the recorded flights".to_owned());
-    }
     let packages = missing(&FOR_CI);
     if !packages.is_empty() && installs(repository) {
         println!("steps will install {packages:?}");

@@ -19,6 +19,7 @@ pub mod docs;
 pub mod envelope;
 pub mod esp32;
 mod esp32_link;
+pub mod estimation;
 pub mod examples;
 pub mod features;
 pub mod figures;

@@ -12,10 +12,6 @@ use std::path::PathBuf;
 pub struct CampaignOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
-    /// Compare the estimator's errors and innovations with its covariance (NEES, NIS), and judge by that. Meant for
-    /// `--mission random --flights 500`.
-    #[arg(long)]
-    pub consistency: bool,
     /// How many flights; 3000 with `--faults`, 1000 with `--envelope`. With `--sticks`, how many of
     /// each file in each mode; 3.
     #[arg(long, value_name = "N", default_value_t = 100, default_value_ifs([("faults", "true".into(), "3000"), ("envelope", "true".into(), "1000"), ("sticks", ArgPredicate::IsPresent, "3")]), value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
@@ -27,20 +23,20 @@ pub struct CampaignOptions {
     /// sizes, moments, missions and surroundings at random, one in ten without a fault. Every
     /// flight must end as its fault allows (`stampfly faults`), and motors that were stopped in the
     /// air must have been stopped rightly: flown on, the same flight must have ended badly.
-    #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot"])]
+    #[arg(long, conflicts_with_all = ["fault", "pilot"])]
     pub faults: bool,
     /// Fly sound vehicles through everything that may be flown and met: missions by a program and by
     /// a pilot, sticks anywhere in any mode, in the harsh world, with gusts of up to 5 m/s. With
     /// `--sticks`, those files as well. Exit code 1 when a flight did not end well, or a sound
     /// vehicle stopped its motors, landed or took another mode by itself.
-    #[arg(long, conflicts_with_all = ["consistency", "fault", "pilot", "faults", "mission", "mode"])]
+    #[arg(long, conflicts_with_all = ["fault", "pilot", "faults", "mission", "mode"])]
     pub envelope: bool,
     #[command(flatten)]
     pub of_faults: FaultCampaignOptions,
     /// Fly stick files, and the `.csv` files of folders: each as it is, and one with a single mode
     /// in every other mode of the vehicle, too. Exit code 1 when a flight did not end well, or a
     /// sound vehicle stopped its motors, landed or took another mode by itself.
-    #[arg(long, value_name = "PATH", num_args = 1.., group = "by_sticks", conflicts_with_all = ["mission", "consistency", "faults"])]
+    #[arg(long, value_name = "PATH", num_args = 1.., group = "by_sticks", conflicts_with_all = ["mission", "faults"])]
     pub sticks: Vec<PathBuf>,
     #[command(flatten)]
     pub with_sticks: StickArguments,

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 /// What decides a simulated flight.
 #[derive(Clone, Debug, Default, Args)]
 pub struct SceneOptions {
+    /// Which vehicle.
     #[command(flatten)]
     pub vehicle: VehicleOption,
     /// Mission to fly: a file, its text with `;` between steps (StampFly: `arm; takeoff 0.5; land`), or one that the vehicle

@@ -1,7 +1,7 @@
 // A ULog file as a vehicle: its topics, the sample of each at a time, frames of the whole flight.
 //
 // What is whole, where reading goes on behind damage, how formats within formats are named and how
-// much of a file may be laid out are as in `stampfly_log::ulog` and `stampfly_lab::flight_log`, and
+// much of a file may be laid out are as in `stampfly_log::ulog` and `stampfly_host::flight_log`, and
 // so is the sentence that says how far a log is whole.
 
 const MAGIC = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];

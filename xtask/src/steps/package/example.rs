@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Libraries that nobody adds by themselves: the macros come with the bus, the others belong to the program.
-const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host", "stampfly-lab"];
+const NOT_ALONE: &[&str] = &["stampfly-bus-macros", "stampfly-host"];
 
 /// The page that says how a vehicle of one's own is made, and its program.
 const VEHICLE: (&str, &str) = ("docs/guide/own-vehicle.md", "examples/examples/own_vehicle.rs");
