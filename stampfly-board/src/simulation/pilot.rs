@@ -187,9 +187,12 @@ impl<'b> Pilot<'b> {
                 }
                 Step::TakeOff { height } => {
                     place.z = -height;
-                    // It takes off by itself where the mode holds height.
+                    // Where the mode holds height the vehicle climbs by itself, and the pilot keeps it over its
+                    // place as soon as it is clear of the ground, on which a lean would tip it over.
+                    let mut height = 0.0;
                     while !self.flown().is_manual() && self.radio.telemetry().phase != FlightPhase::Flying {
-                        self.frame(Aim::LetGo).await;
+                        let aim = if height > CLEAR { Aim::Be(place) } else { Aim::LetGo };
+                        height = -self.frame_with(aim, Some(0.0)).await.position.z;
                     }
                     self.fly_to(place).await;
                 }
