@@ -2,9 +2,9 @@
 //!
 //! The filter is two moving averages of four in a row, which gives the weights 1 2 3 4 3 2 1,
 //! computed exactly in integers. It has double zeros at one and two times the output rate, the
-//! frequencies that alias to zero: with 1600 Hz in and 400 Hz out it damps a rotor at hover (478
-//! Hz) by 30 dB. The weights are symmetric, so every frequency is delayed by three input samples:
-//! the output is valid for the first sample of the newest group.
+//! frequencies that alias to zero: with 1600 Hz in and 400 Hz out it damps a rotor at hover
+//! (478 Hz) by 30 dB. The weights are symmetric, so every frequency is delayed by three input
+//! samples: the output is valid for the first sample of the newest group.
 //!
 //! Not for ratios other than four. It does not replace a notch filter: frequencies below half the
 //! output rate pass.

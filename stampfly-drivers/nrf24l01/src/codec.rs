@@ -1,6 +1,6 @@
-//! Commands, registers and values of the nRF24L01+, from Nordic's product specification 1.0 of
-//! September
-//! 2008. Differences of the older nRF24L01 are from its product specification 2.0 of July 2007.
+//! Commands, registers and values of the nRF24L01+, from Nordic's product specification 1.0
+//! (September 2008), and differences of the older nRF24L01, from its product specification 2.0
+//! (July 2007).
 
 use crate::{AddressBytes, Checksum, Config, Power, Rate};
 

@@ -247,8 +247,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// Sets the chip up, checks that it keeps its times and limits, and measures three times. 0.15
-    /// s by default; at most 21 periods and one second on a slow bus with
+    /// Sets the chip up, checks that it keeps its times and limits, and measures three times.
+    /// 0.15 s by default; at most 21 periods and one second on a slow bus with
     /// [`TransferLimit::I2C_SENSORS`].
     ///
     /// The chip tests laser and detector in every measurement: this test checks that they pass and
