@@ -22,7 +22,7 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// Age of the data at `now`; zero when its stamp lies in the future.
+    /// Age of the data at `now`; zero when its stamp is in the future.
     #[inline]
     #[must_use]
     pub fn age(&self, now: Instant) -> Duration {

@@ -46,7 +46,7 @@ impl Peak {
 ///
 /// Computes digit by digit in 32 bits, so that the driver needs no maths library and a small
 /// processor no division. With the tried digit d and the root r so far, r + d is kept while (r +
-/// d)² is not above the square. The remainder, doubled for each digit, decides that.
+/// d)² is not above the square. The comparison uses the remainder, which is doubled for each digit.
 fn root(square: u32) -> f32 {
     if square == 0 {
         return 0.0;

@@ -18,7 +18,7 @@ pub struct Sample<T> {
 }
 
 impl<T> Sample<T> {
-    /// Age of the data at `now`; zero when its time stamp lies in the future.
+    /// Age of the data at `now`; zero when its time stamp is in the future.
     ///
     /// ```
     /// use stampfly_driver_core::Sample;

@@ -2,10 +2,10 @@
 //! *guest*.
 //!
 //! With a lock, the inertial sensor waits whenever the flow sensor happens to transfer, and its
-//! samples are delayed by a random time. Here the lead transfers whenever it wants to. The guest
-//! transfers only in the pause after the lead's transfers, and only when its own transfer ends
-//! before the lead is due again. Use it where one device has to be on time and its transfers are
-//! short compared with its period.
+//! samples are delayed by a random time. Here the lead transfers at any time. The guest transfers
+//! only in the pause after the lead's transfers, and only when its own transfer ends before the
+//! lead is due again. Use it where one device has to be on time and its transfers are short
+//! compared with its period.
 //!
 //! Not for two devices that both have to be on time, and not for transfers longer than the pause.
 //! Not across executors: the state is in `Cell`s, so both tasks run on one executor.
@@ -149,7 +149,7 @@ impl<E: Debug> Display for SlotError<E> {
 
 impl<E: Debug> core::error::Error for SlotError<E> {}
 
-/// Next action of a guest that wants to transfer.
+/// Next action of a guest that has a transfer to make.
 enum Opening {
     /// Transfer now.
     Now,

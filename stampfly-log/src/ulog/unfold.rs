@@ -10,7 +10,7 @@ use core::fmt;
 pub(super) const MAX_DEPTH: usize = 6;
 /// Maximum number of declarations and elements in one expansion. A sample has at most 65,535 bytes.
 pub(super) const MAX_STEPS: usize = 1 << 16;
-/// Every this many bytes of a declaration count as one more step.
+/// Number of bytes of a declaration that count as one step.
 const LETTERS: usize = 64;
 
 /// Path to a scalar through nested formats. Displays as `esc[0].esc_rpm`.

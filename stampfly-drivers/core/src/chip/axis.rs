@@ -1,8 +1,8 @@
 //! Orientation of a chip on its board, in steps of 90°.
 //!
-//! Every driver delivers its samples in the body frame (FRD). The board knows which way its chips
-//! are mounted and passes an [`AxisMap`] to each driver. Not for mounting errors of a few degrees:
-//! correct those by calibration.
+//! Every driver delivers its samples in the body frame (FRD). The board's code passes the mounting
+//! of each chip as an [`AxisMap`]. Not for mounting errors of a few degrees: correct those by
+//! calibration.
 
 use stampfly_types::Vec3;
 
@@ -49,8 +49,8 @@ impl Axis {
 /// ```
 /// use stampfly_driver_core::chip::{Axis, AxisMap};
 /// use stampfly_types::Vec3;
-/// // A chip that lies upside down, its x axis to the right.
 /// // A chip mounted upside down, with its x axis to the right.
+/// let map = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 /// assert_eq!(map.to_body(Vec3::new(1.0, 2.0, 3.0)), Vec3::new(2.0, 1.0, -3.0));
 /// assert_eq!(AxisMap::new(Axis::PlusX, Axis::PlusX, Axis::PlusZ), None, "an axis is used twice");
 /// assert_eq!(AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::PlusZ), None, "a mirror");

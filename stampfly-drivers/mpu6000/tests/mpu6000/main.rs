@@ -290,7 +290,7 @@ fn the_self_test_passes_and_fails_with_a_sensor_that_does_not_move() {
     bench.run(async |imu| imu.self_test().await).expect("a good chip");
     bench.attached.set_broken(true);
     let failed = bench.run(async |imu| imu.self_test().await);
-    // Its gyroscope's and accelerometer's zeros are told apart from nobody by its thermometer.
+    // The chip answers, but its proof masses do not respond.
     assert_eq!(failed, Err(ChipError::SelfTest));
     bench.attached.set_broken(false);
     bench.next().expect("set up again");
