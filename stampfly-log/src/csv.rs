@@ -92,6 +92,7 @@ pub fn is_header<M: Message>(line: &str) -> bool {
 pub fn read_line<M: Message>(line: &str) -> Result<M, CsvError> {
     let mut columns = line.trim_end().split(',');
     let message: Option<M> = text::read(|_| columns.next().ok_or(CsvError::Columns))?;
+    // `f32::from_str` accepts "inf" and "NaN", which no message may contain.
     let message = message.filter(text::is_finite).ok_or(CsvError::Value)?;
     if columns.next().is_none() { Ok(message) } else { Err(CsvError::Columns) }
 }

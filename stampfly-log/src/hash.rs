@@ -74,6 +74,8 @@ impl FlightHash {
         let length = words.len() as u16;
         a = step::<0>(a, pair((u32::from(length) << 16) | u32::from(topic), generation));
         b = step::<1>(b, at.as_micros());
+        // Four words at a time, two for each lane, so that the multiplications of the lanes
+        // overlap.
         let (fours, rest) = words.as_chunks::<4>();
         for &[w0, w1, w2, w3] in fours {
             a = step::<0>(a, pair(w0, w1));

@@ -90,6 +90,7 @@ impl ActivationTopic {
         let now = Instant::from_micros(take.u64()?);
         let mut record = ActivationRecord::new(u8::try_from(take.u32()?).ok()?, now);
         record.refused = take.u32()?;
+        // The generations of all inputs precede the numbers of samples.
         let mut taken = Take(take.0.get(inputs.checked_mul(4)?..)?);
         for _ in 0..inputs {
             record.push(InputRecord { generation: take.u32()?, taken: taken.u16()? }).ok()?;

@@ -115,6 +115,7 @@ impl ActivationRecord {
     #[inline]
     pub const fn places<const N: usize>(&mut self) -> Option<&mut [InputRecord; N]> {
         const { assert!(N <= MAX_INPUTS, "an activation has at most MAX_INPUTS inputs") };
+        // The assertion bounds N, so the cast is exact and the slice exists.
         self.count = N as u8;
         self.inputs.first_chunk_mut()
     }

@@ -73,6 +73,7 @@ pub const GRAVITY: f32 = 9.806_65;
 #[must_use]
 pub fn roll_pitch_yaw(attitude: &Quat) -> [f32; 3] {
     let [w, x, y, z] = attitude.wxyz();
+    // `math::asin` clamps its argument, which rounding can push beyond ±1 near vertical pitch.
     [math::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math::asin(2.0 * (w * y - z * x)), yaw(attitude)]
 }
 

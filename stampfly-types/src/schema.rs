@@ -72,6 +72,7 @@ impl FieldKind {
         match self {
             Self::F64 | Self::U64 | Self::I64 => 2,
             Self::Message(fields) => {
+                // A loop with an index, because iterators cannot be used in a `const fn`.
                 let (mut size, mut index) = (0, 0);
                 while index < fields.len() {
                     size += fields[index].words;

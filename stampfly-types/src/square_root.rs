@@ -42,6 +42,8 @@ pub fn sqrt(value: f32) -> f32 {
     let integer = near & FRACTION | HIDDEN;
     let shift = 150 + (bits >> 23) - 2 * (near >> 23);
     let excess = (bits << shift).wrapping_sub(integer.wrapping_mul(integer)) as i32;
+    // A neighbour is nearer when the remainder exceeds half the distance to its square:
+    // (n ± ½)² ≈ n² ± n.
     let most = integer as i32;
     f32::from_bits(near + u32::from(excess > most) - u32::from(excess <= -most))
 }

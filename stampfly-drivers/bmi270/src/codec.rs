@@ -222,6 +222,8 @@ impl Status {
     /// Decodes the burst.
     #[must_use]
     pub const fn decode(burst: &[u8; 14]) -> Self {
+        // The burst covers registers that are not used, because one transfer is cheaper than
+        // several.
         let [time0, time1, time2, event, _, _, _, _, _, internal, temp0, temp1, fifo0, fifo1] = *burst;
         let temperature = i16::from_le_bytes([temp0, temp1]);
         Self {

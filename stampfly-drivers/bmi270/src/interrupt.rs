@@ -57,6 +57,8 @@ impl<P: Wait> Interrupt<P> {
     pub(super) async fn wait<R, T: Timebase>(&mut self, port: &mut Port<R, T>, due: Instant, little: Duration) {
         self.raised = false;
         match &mut self.pin {
+            // When samples are already due, the pin is high at best and waiting for it gains
+            // nothing.
             Some(pin) if self.wrong < PATIENCE && port.now() < due => {
                 self.raised = matches!(port.until(due + LATE, pin.wait_for_high()).await, Some(Ok(())));
                 if self.raised {

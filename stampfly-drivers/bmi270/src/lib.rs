@@ -207,12 +207,14 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::PWR_CTRL, &[codec::ALL_SENSORS]).await?;
         self.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
         self.port.wait(GYRO_START).await;
+        // The chip rejects invalid combinations and reports them in the status.
         let kept: [u8; 4] = self.port.read(register::ACC_CONF).await?;
         let (status, ..) = self.status().await?;
         if kept != wanted || status.configuration_error {
             return Err(ChipError::Configuration { status: kept[0] });
         }
         self.temperature = status.celsius().unwrap_or(self.temperature);
+        // Read twice, because the factor stays in use until the next start.
         let [factor]: [u8; 1] = self.port.read_twice(register::GYR_CAS).await?;
         self.cross_axis = f32::from(codec::cross_axis_factor(factor)) / 512.0;
         self.restart_fifo().await?;
@@ -305,6 +307,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.port.wait(POWER_UP).await;
         self.write(register::INIT_CTRL, &[0]).await?;
         for (number, chunk) in self.blob.chunks(R::LONGEST_WRITE).enumerate() {
+            // The address counts in words and is set for each piece, so a piece has an even length.
             self.write(register::INIT_ADDR_0, &codec::init_address(number * R::LONGEST_WRITE)).await?;
             self.write(register::INIT_DATA, chunk).await?;
         }
@@ -390,16 +393,21 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
                     self.running = false;
                     return Err(ChipError::NoSample);
                 }
+                // Sample periods until four frames are complete. At least one after a read too late
+                // in its period; a read too early in it is repeated within the same period.
                 let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));
                 self.due = newest + ticks_to_micros(missing * period + AIM);
                 continue;
             }
+            // Samples may have been lost, so the caller empties the FIFO and restarts the filter.
             if frames >= OVERRUN {
                 return Ok(None);
             }
             self.reading = true;
             let bytes = self.port.read(register::FIFO_DATA).await?;
             self.reading = false;
+            // After this read `frames` − 4 are left, so the next four are complete in 8 − `frames`
+            // periods.
             self.due = newest + ticks_to_micros(8u64.saturating_sub(frames) * period + AIM);
             let Some(group) = codec::decode_frames(&bytes, status.holds_whole_frames()) else { return Ok(None) };
             return Ok(Some((newest - self.chip_period(frames - 1), group)));
@@ -435,6 +443,7 @@ impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {
                 continue;
             };
             let peak = self.peak.push(&group);
+            // The first group only fills the filter.
             let Some(sum) = self.decimator.push(&group) else { continue };
             let [ax, ay, az, gx, gy, gz] = sum.map(|sixteenths| sixteenths as f32 / Decimator::GAIN as f32);
             let scale = GRAVITY / self.config.accel_range.counts_per_g();

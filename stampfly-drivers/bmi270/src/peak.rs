@@ -35,6 +35,7 @@ impl Peak {
     #[must_use]
     pub fn push(&mut self, group: &[[i16; 6]; 4]) -> f32 {
         let [first, second, third, fourth] = group.map(|[x, y, z, ..]| [x, y, z]);
+        // Runs of three that cross the boundary of two groups need the last two samples.
         let [older, old] = core::mem::replace(&mut self.before, [third, fourth]);
         let runs = [[older, old, first], [old, first, second], [first, second, third], [second, third, fourth]];
         let largest = runs.iter().map(common_square).max().unwrap_or_default();
@@ -77,6 +78,8 @@ fn common_square(run: &[[i16; 3]; AGREE]) -> u32 {
     let [a, b, c] = run;
     let axis = |axis: usize| {
         let [a, b, c] = [a, b, c].map(|sample| i32::from(sample[axis]));
+        // At most one of the two terms is not zero: the smallest value if all are positive, or the
+        // largest if all are negative.
         let common = a.min(b).min(c).max(0) + a.max(b).max(c).min(0);
         (common * common).unsigned_abs()
     };

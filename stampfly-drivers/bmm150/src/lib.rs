@@ -130,6 +130,7 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
     }
 
     async fn set_up(&mut self) -> Result<Trim, ChipError<R::Error>> {
+        // A measurement has to fit into the period.
         if self.config.preset.duration() > self.config.rate.period() {
             return Err(ChipError::InvalidConfiguration);
         }
@@ -157,6 +158,7 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
             let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
             let now = self.port.now();
+            // Power and mode are part of every burst, so a restart is detected at once.
             if reading.power & codec::POWER_ON == 0 || reading.mode != codec::mode_bits(&self.config) {
                 self.trim = None;
                 return Err(ChipError::Restarted);
@@ -186,6 +188,7 @@ impl<R: Registers, T: Timebase> Magnetometer for Bmm150<R, T> {
         };
         let (seen, reading) = self.reading().await?;
         let field = trim.compensate(&reading).ok_or(ChipError::Data)?;
+        // The data was ready at the end of the measurement.
         let at = seen - self.config.preset.duration() / 2;
         Ok(Sample { at, data: MagData { field: self.axes.to_body(field) } })
     }

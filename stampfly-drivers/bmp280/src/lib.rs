@@ -177,6 +177,8 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
         let limit = codec::conversion_limit(&self.config);
         let mut failed = 0;
         for _ in 0..STARTS {
+            // Set before the write, so that time spent waiting for the bus does not lengthen the
+            // interval.
             self.due = self.port.now() + self.config.interval.max(limit);
             let control = codec::oversampling_bits(&self.config) | codec::FORCED;
             self.port.write(register::CTRL_MEAS, &[control]).await?;
@@ -204,6 +206,7 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
         loop {
             let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::STATUS).await?);
+            // The settings are part of the burst, so a restart is detected at once.
             if (reading.oversampling_bits, reading.filter_bits) != wanted {
                 self.calibration = None;
                 return Err(ChipError::Restarted);

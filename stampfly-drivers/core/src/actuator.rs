@@ -151,6 +151,7 @@ impl<P: SetDutyCycle, const N: usize> MotorOutputs for PwmMotors<P, N> {
 
     fn write(&mut self, output: &MotorOutput) -> Result<(), MotorError> {
         let mut result = Ok(());
+        // One token per output: without it every duty below is zero.
         let token = self.interlock.token(output);
         let channels = self.channels.iter_mut().zip(&mut self.duties).enumerate();
         for ((index, (channel, duty)), wanted) in channels.zip(output.duty) {

@@ -31,6 +31,8 @@ impl Decimator {
     /// the filter and returns `None`.
     #[must_use]
     pub fn push(&mut self, group: &[[i16; 6]; 4]) -> Option<[i32; 6]> {
+        // The seven weights span two groups: the samples of this group have the falling weights
+        // 4 3 2 1 in this output and the rising weights 0 1 2 3 in the next one.
         let before = self.carry.replace(weighted(group, [0, 1, 2, 3]));
         let mut sum = weighted(group, [4, 3, 2, 1]);
         for (sum, before) in sum.iter_mut().zip(before?) {

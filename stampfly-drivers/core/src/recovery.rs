@@ -98,6 +98,7 @@ where
 {
     let mut lines = Lines { scl, sda, delay, patience: PATIENCE };
     let outcome = lines.recover().await;
+    // Both lines are released in any case, so that the peripheral can take over.
     let released = (lines.scl.set_high(), lines.sda.set_high());
     if released.0.is_err() || released.1.is_err() { outcome.and(Err(RecoveryError::Pin)) } else { outcome }
 }

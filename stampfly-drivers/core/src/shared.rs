@@ -113,6 +113,7 @@ impl<B: RecoverableI2c, const N: usize> SharedI2c<B, N> {
 
     /// Takes the bus when it is free for this share, or queues the share's waker.
     fn poll_turn(&self, index: usize, context: &mut Context<'_>) -> Poll<B> {
+        // A share that was woken is served before all others, even if it has not been polled yet.
         if self.called.get().is_none_or(|called| called == index)
             && let Some(bus) = self.bus.take()
         {
@@ -164,6 +165,7 @@ impl<B: RecoverableI2c, const N: usize> Drop for Wait<'_, B, N> {
         if let Some(place) = self.bus.waiting.get(self.index) {
             place.set(None);
         }
+        // The turn must not be lost with the future that was woken for it.
         if self.bus.called.get() == Some(self.index) {
             self.bus.call_next(self.index);
         }
@@ -198,6 +200,7 @@ impl<B: RecoverableI2c, const N: usize> I2c for Share<'_, B, N> {
         let wait = Wait { bus: shared, index };
         let bus = poll_fn(|context| shared.poll_turn(index, context)).await;
         drop(wait);
+        // From here on `Turn` returns the bus, also when this future is dropped.
         let mut turn = Turn { shared, index, bus: Some(bus), finished: false };
         // Always `Some`: it is taken only in `drop`. The alternative must not panic, so it waits.
         let Some(bus) = &mut turn.bus else { core::future::pending().await };

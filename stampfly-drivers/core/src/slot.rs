@@ -200,6 +200,7 @@ impl<T: Timebase + Clone> Slots<T> {
     fn opening(&self, longest: Duration) -> Opening {
         let now = self.clock.now();
         let Rhythm { period, guard, settle } = self.rhythm;
+        // A lead that has missed two periods has failed or is restarting.
         let silent = self.ended.get().max(self.begun.get()) + period + period;
         if self.lead.get() {
             return Opening::AfterLead(now + period);
@@ -213,6 +214,7 @@ impl<T: Timebase + Clone> Slots<T> {
         let opens = self.ended.get() + settle;
         let closes = self.begun.get() + period - (guard + longest);
         match () {
+            // No room before the next burst: wait for its end, or until the lead counts as silent.
             () if opens > closes || now > closes => Opening::AfterLead(silent),
             () if now < opens => Opening::At(opens),
             () => Opening::Now,
@@ -254,6 +256,7 @@ impl<T: Timebase + Clone> Slots<T> {
                     }
                 }
             }
+            // A clock that stands still never reaches the instant of `Opening::At`.
             stands |= standstill.take();
         }
     }

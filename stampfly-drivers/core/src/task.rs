@@ -69,6 +69,7 @@ impl SensorHealth {
 
     fn note(&self, kind: SensorErrorKind) {
         Self::count(&self.errors);
+        // A kind that is missing in the table counts as `Other`, its last entry.
         let place = KINDS.iter().position(|known| *known == kind).unwrap_or(KINDS.len() - 1);
         self.last.store(place as u32 + 1, Ordering::Relaxed);
     }

@@ -109,6 +109,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.running = false;
         let config = self.config;
         self.keeps(&config).await?;
+        // A single conversion, because the configured averaging may take seconds.
         let single = Config { average: Average::A1, time: ConversionTime::Us1100, ..config };
         self.write(codec::configuration(&single)).await?;
         self.keeps(&single).await?;
@@ -188,6 +189,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.port.wait_until(self.due).await;
         loop {
             let looks = self.port.now();
+            // A chip that restarted measures all channels with other timing.
             if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
                 self.running = false;
                 return Err(ChipError::Restarted);

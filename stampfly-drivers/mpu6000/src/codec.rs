@@ -189,11 +189,14 @@ impl Sample {
 #[must_use]
 pub fn factory_answers(registers: [u8; 4]) -> [f32; 6] {
     let [x, y, z, rest] = registers;
+    // A code of the accelerometer has five bits: the upper three are in the register of the axis,
+    // the lower two in the last register.
     let accel = [x >> 5 << 2 | rest >> 4 & 3, y >> 5 << 2 | rest >> 2 & 3, z >> 5 << 2 | rest & 3];
     let gyro = [x & 0x1F, y & 0x1F, z & 0x1F];
     // The factor is (0.92 / 0.34)^(1/30); the exponents are integers.
     let [ax, ay, az] = accel.map(|code| grown(4096.0 * 0.34, 1.033_736, code));
     let [gx, gy, gz] = gyro.map(|code| grown(25.0 * 131.0, 1.046, code));
+    // The factory response of the gyroscope's y axis is negative (RM 4.1).
     [ax, ay, az, gx, -gy, gz]
 }
 

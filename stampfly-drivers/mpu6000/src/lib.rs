@@ -222,9 +222,11 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         // On SPI the device reset must be followed by a reset of the signal paths (RM 4.30).
         self.port.write(register::SIGNAL_PATH_RESET, &[codec::ALL_PATHS]).await?;
         self.port.wait(START_UP).await;
+        // The reset has enabled I2C again.
         self.port.write(register::USER_CTRL, &[codec::SPI_ONLY]).await?;
         self.wake().await?;
         self.port.write(register::SMPLRT_DIV, &settings).await?;
+        // Time for the gyroscope to start, which is also the clock source now.
         self.port.wait(GYRO_START).await;
         let kept: [u8; 4] = self.port.read(register::SMPLRT_DIV).await?;
         if let Some((kept, _)) = kept.into_iter().zip(settings).find(|(kept, wanted)| kept != wanted) {
@@ -274,6 +276,7 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         }
         self.running = false;
         let [power]: [u8; 1] = self.port.read(register::PWR_MGMT_1).await?;
+        // An awake chip without data is a fault of the bus; a sleeping one has restarted.
         Err(if power == 0xFF || power == codec::AWAKE { ChipError::Data } else { ChipError::Restarted })
     }
 
@@ -310,6 +313,8 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Imu for Mpu6000<S, T
         self.due = if planned > at { planned } else { at + self.config.interval };
         match self.last {
             Some((last, since)) if last == sample => {
+                // Noise alone changes the values; equal ones come from a chip that has stopped
+                // sampling.
                 if at.since(since) > FROZEN {
                     self.running = false;
                     return Err(ChipError::NoSample);

@@ -135,6 +135,7 @@ pub const fn airtime(config: &Config, payload: usize) -> u64 {
         Checksum::One => 1,
         Checksum::Two => 2,
     };
+    // The preamble is one byte.
     let bits = 8 * (1 + address_bytes(config.address_bytes) + payload + checksum) as u64;
     match config.rate {
         Rate::Kbit250 => 4 * bits,

@@ -191,6 +191,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
                 return Err(ChipError::SelfTest);
             }
         }
+        // Low power, to disturb other radios as little as possible.
         let quiet = codec::rf_setup(self.config.rate, Power::Minus18);
         self.port.write(register::RF_SETUP, &[quiet]).await?;
         let sent = self.send(TEST, &[0; N]).await;
@@ -232,6 +233,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         }
         self.enable(true)?;
         self.tuned = Some(tuning);
+        // SPI access directly after the edge would be too early.
         self.port.wait(AFTER_CE).await;
         Ok(())
     }
@@ -351,6 +353,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         self.enable(true)?;
         self.port.wait(PULSE).await;
         self.enable(false)?;
+        // No polling during the transmission, whose duration is known.
         let takes = SETTLE + Duration::from_micros(codec::airtime(&self.config, N));
         let deadline = self.port.now() + takes + SEND_MARGIN;
         self.port.wait(takes).await;

@@ -202,6 +202,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if found != codec::PRODUCT || inverse != !codec::PRODUCT {
             return Err(ChipError::Identification { found: u16::from_be_bytes([found, inverse]) });
         }
+        // Part of the data sheet's start sequence: reading the motion registers clears them.
         for offset in 0..5 {
             self.read(register::MOTION + offset).await?;
         }
@@ -269,6 +270,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         for (register, value) in codec::PREPARE {
             self.write(register, value).await?;
         }
+        // The chip prepares its calibration; 0x08 reports that it is ready.
         let mut status = self.read(0x47).await?;
         for _ in 1..ATTEMPTS {
             if status == 0x08 {
@@ -280,11 +282,13 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if status != 0x08 {
             return Err(ChipError::Configuration { status });
         }
+        // Undocumented values, as in the data sheet's list.
         let range = if self.read_twice(0x67).await? & 0x80 != 0 { 0x04 } else { 0x02 };
         self.write(0x48, range).await?;
         for (register, value) in codec::PREPARE_CALIBRATION {
             self.write(register, value).await?;
         }
+        // The data sheet's list writes a calibration back only when this register reads zero.
         if self.read_twice(0x73).await? != 0 {
             return Ok([Some((0x00, 0x50, 0x00)), Some((0x00, 0x51, 0x7B)), Some((0x0E, 0x48, range)), None, None]);
         }
@@ -364,6 +368,7 @@ impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
         self.emptied = None;
         let motion = self.burst().await?;
         let at = self.clock.now();
+        // An interval of zero would make every angle an infinite rate.
         if at <= emptied {
             return Err(ChipError::ClockStopped);
         }

@@ -72,6 +72,7 @@ impl<C: SetFrequency> Buzzer<C> {
     /// When the channel refuses. The next step tries again.
     pub fn step(&mut self, now: Instant) -> Result<(), C::Error> {
         let began = *self.began.get_or_insert(now);
+        // Time into the tune; the search subtracts the length of each note before the present one.
         let mut left = now.since(began).as_micros() / 1_000;
         let note = self.tune.iter().find(|(_, millis)| {
             let ends = left < u64::from(*millis);

@@ -91,6 +91,7 @@ where
     fn write(&mut self) {
         if let Some([red, green, blue]) = self.wanted {
             let written = self.writer.write([RGB8 { r: red, g: green, b: blue }; N]);
+            // After a failed write the colour is unknown, so the next signal writes again.
             self.shown = self.wanted.filter(|_| written.is_ok());
         }
     }

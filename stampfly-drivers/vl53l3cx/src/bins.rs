@@ -256,6 +256,7 @@ impl Histogram {
         let (from, until) = strongest?;
         let window = from + period - 1..from + period + (until - from + 1).min(period - 1);
         let counts: i32 = window.clone().map(|place| self.above(place, ambient)).sum();
+        // Finds the bin in which the cumulative count reaches half of the total.
         let (mut before, mut bins) = (0, 0.0);
         for place in window.clone() {
             let own = self.above(place, ambient);
@@ -283,6 +284,7 @@ impl Histogram {
     /// Time of flight to the middle of the pulse in bins, modulo the laser period.
     fn travelled(&self, middle: f32, laser_start: u8) -> f32 {
         let period = self.part().period() as f32;
+        // The chip measures its reference with another start of the laser than the target.
         let start = f32::from(self.reference_start) - f32::from(laser_start);
         let zero = f32::from(self.reference_phase) / PHASES + start;
         let travelled = middle - zero;
@@ -335,6 +337,7 @@ impl Histogram {
         };
         let travelled = self.travelled(pulse.middle, exposure.laser_start);
         let length = exposure.bin_length();
+        // Per time of the pulse, as the chip reports it in the light mode.
         reading.signal_rate = pulse.counts / (counted * PULSE);
         reading.sigma = math::sqrt(pulse.variance * length * length + BEST_SIGMA * BEST_SIGMA);
         reading.distance = travelled * length + offset * GAIN;

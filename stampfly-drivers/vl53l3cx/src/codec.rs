@@ -173,6 +173,7 @@ const fn rounded(dividend: u64, divisor: u64) -> u64 {
 /// A number of macro periods in the chip's encoding: eight bits and a binary exponent.
 #[must_use]
 pub const fn encode_timeout(macro_periods: u64) -> u16 {
+    // The chip adds one when it decodes the value.
     let mut mantissa = macro_periods.saturating_sub(1);
     let mut exponent = 0;
     while mantissa > 0xFF {
@@ -209,6 +210,7 @@ pub const fn ranging(config: &Config) -> [u8; 12] {
 /// The factor of 1.075 is from the published drivers.
 #[must_use]
 pub const fn inter_measurement(period: Duration, oscillator: u16) -> [u8; 4] {
+    // 43/40 is 1.075; the remaining factor of 1000 converts µs to ms.
     let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.as_micros()).saturating_mul(43) / 40_000;
     (if ticks > u32::MAX as u64 { u32::MAX } else { ticks as u32 }).to_be_bytes()
 }

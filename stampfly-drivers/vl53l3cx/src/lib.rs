@@ -486,6 +486,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
                     Some(before) => before + now.since(before) / 2,
                     None => now.min(self.due + (period - early(period))),
                 };
+                // Wakes up before the measurement is expected, to see the interrupt rise.
                 self.due = seen + early(period);
                 return Ok(seen);
             }

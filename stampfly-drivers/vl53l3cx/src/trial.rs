@@ -80,6 +80,7 @@ impl Trial {
     #[inline(never)]
     pub(crate) fn note(&mut self, now: Instant, result: Option<Reading>) -> Option<Verdict> {
         let until = *self.until.get_or_insert(now + LIMIT);
+        // Too few results in time, which is no evidence against the light mode.
         if now > until {
             return Some(Verdict::Plausible);
         }

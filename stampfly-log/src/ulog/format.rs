@@ -258,6 +258,7 @@ impl<'a> Iterator for Columns<'a> {
             if self.offset.saturating_add(size) > usize::from(u16::MAX) {
                 return self.end(FieldError::TooLong(text));
             }
+            // ULog's own convention for bytes that hold no data.
             if declaration.name.starts_with("_padding") {
                 self.offset += size;
             } else {

@@ -161,6 +161,7 @@ impl<'a> Reader<'a> {
 
     /// End of the part that contains offset `at`: the next appended part, or the end of the file.
     fn part_end(&self, at: usize) -> usize {
+        // Without this flag the offsets have no meaning.
         let is_appended = self.flags.incompatible[0] & FlagBits::DATA_APPENDED != 0;
         let offsets = self.flags.appended.iter().filter(|_| is_appended);
         let offsets = offsets.filter_map(|offset| usize::try_from(*offset).ok());
@@ -170,6 +171,7 @@ impl<'a> Reader<'a> {
     /// Where to continue after damage at `at`: the next sync mark in this part, or the next part.
     fn resume(&self, at: usize) -> usize {
         let end = self.part_end(at);
+        // From the byte after the damage on, so that every resumption makes progress.
         let rest = self.bytes.get(at + 1..end).unwrap_or_default();
         find_mark(rest).map_or(end, |skipped| at + 1 + skipped)
     }

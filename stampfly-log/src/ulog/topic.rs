@@ -81,6 +81,7 @@ impl Topic {
     /// unspecified then. Check with [`is_format`](Self::is_format) first that the log's format is
     /// that of this topic.
     pub fn decode(&self, payload: &[u8], words: &mut [u32]) -> Option<Stamp> {
+        // The sizes are equal from here on, so every read below succeeds.
         if payload.len() != self.size() || words.len() != self.words() {
             return None;
         }

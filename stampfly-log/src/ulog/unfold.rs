@@ -177,10 +177,12 @@ impl<'a, F: Fn(&str) -> Option<Format<'a>>> Iterator for Unfolded<'a, F> {
                     }
                 }
                 Some(_) => open.field = None,
+                // All fields of this format are done: continue with the enclosing one.
                 None if open.rest.is_empty() => self.depth -= 1,
                 None => {
                     let (text, rest) = open.rest.split_once(';').unwrap_or((open.rest, ""));
                     open.rest = rest;
+                    // Bounds the time for declarations of any length, not only their number.
                     self.steps += text.len() / LETTERS;
                     if text.trim_ascii().is_empty() {
                         continue;
@@ -193,6 +195,7 @@ impl<'a, F: Fn(&str) -> Option<Format<'a>>> Iterator for Unfolded<'a, F> {
                         open.field = Some((declaration, Kind::Fields(format.fields), 0));
                         continue;
                     };
+                    // Checked before the loop over the elements, whose number the file chooses.
                     let size = declaration.count.unwrap_or(1).saturating_mul(scalar.size());
                     if self.offset.saturating_add(size) > usize::from(u16::MAX) {
                         return self.end(FieldError::TooLong(text));

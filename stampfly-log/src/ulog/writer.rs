@@ -54,6 +54,7 @@ impl<S: Sink> Output<S> {
             WordsError::Range(field) => WriteError::OutOfRange(field),
         })?;
         let length = cursor.finish().ok_or(WriteError::TooLong)?;
+        // The size is known only after the body has been written; `MAX_MESSAGE` fits into 16 bits.
         put_u16(&mut self.buffer, (length - MESSAGE_HEAD) as u16);
         self.sink.write(self.buffer.get(..length).unwrap_or_default()).map_err(WriteError::Sink)
     }
@@ -165,6 +166,7 @@ impl<S: Sink> Definitions<S> {
         let before =
             |index: usize, name: &str| topics().take(index).filter(move |earlier| earlier.name == name).count();
         for (index, topic) in topics().enumerate() {
+            // Two bytes for the topic's number.
             if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
                 return Err(WriteError::TooLong);
             }
@@ -251,6 +253,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         if topic.inputs != record.inputs().len() {
             return Err(WriteError::WordCount);
         }
+        // `data` has numbered all topics and activations with 16 bits.
         let id = (self.topics + place) as u16;
         self.record(record.now, b'D', |out| {
             out.put(&id.to_le_bytes());
@@ -342,6 +345,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
     ) -> Result<(), WriteError<S::Error>> {
         let mut result = Ok(());
         if let Some(since) = self.losing_since {
+            // At least a millisecond: a dropout of zero would not show as a gap.
             let millis = u16::try_from(at.since(since).as_micros() / 1_000).unwrap_or(u16::MAX).max(1);
             result = self.output.message(b'O', |out| out.put(&millis.to_le_bytes()));
             if result.is_ok() {
@@ -351,6 +355,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         if result.is_ok() {
             result = self.output.try_message(kind, body);
         }
+        // Other errors are mistakes of the caller, not losses.
         if let Err(WriteError::Sink(_)) = result {
             self.lost = self.lost.saturating_add(1);
             self.losing_since.get_or_insert(at);

@@ -92,6 +92,7 @@ impl Quat {
     #[inline]
     #[must_use]
     pub fn is_unit(&self) -> bool {
+        // False for NaN, too, since every comparison with NaN is.
         (self.norm_squared() - 1.0).abs() < UNIT
     }
 

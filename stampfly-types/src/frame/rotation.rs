@@ -43,6 +43,8 @@ impl Quat {
     /// ```
     #[must_use]
     pub fn from_scaled_axis(turn: Vec3) -> Self {
+        // With the angle θ = |turn| and the axis n = turn/θ the quaternion is
+        // (cos(θ/2), n·sin(θ/2)).
         let half = turn / 2.0;
         let square = half.norm_squared();
         if square <= NO_TURN {
@@ -61,6 +63,7 @@ impl Quat {
         if length <= 0.0 {
             return Vec3::zeros();
         }
+        // q and −q are the same attitude; a negative scalar would be an angle above π.
         let axis = if w >= 0.0 { vector } else { -vector } / length;
         axis * self.angle()
     }
@@ -69,6 +72,7 @@ impl Quat {
     #[must_use]
     pub fn angle(&self) -> f32 {
         let [w, ..] = self.wxyz();
+        // From both parts, because the arc cosine of w alone is inaccurate near zero.
         math::atan2(self.imag().norm(), w.abs()) * 2.0
     }
 

@@ -42,6 +42,7 @@ impl ImuData {
         angular_acceleration: f32,
         accel_full_scale: f32,
     ) -> bool {
+        // An impact saturates one or two axes; all three at once come from stuck or shifted bits.
         let full = self.accel.to_array().iter().all(|axis| axis.abs() >= Self::FULL * accel_full_scale);
         let jumps = before.is_some_and(|(elapsed, rate)| {
             let limit = angular_acceleration * elapsed.clamp(Self::PERIOD, Self::STEADY).seconds();

@@ -260,6 +260,7 @@ impl<R, T: Timebase> Port<R, T> {
 
     /// Runs a future until `instant`. Drops it and returns `None` when it has not finished by then.
     pub async fn until<F: Future>(&mut self, instant: Instant, future: F) -> Option<F::Output> {
+        // Zero when `instant` has passed. The future is polled once in that case, too.
         let left = instant.since(self.now());
         within(&mut self.clock, left, pin!(future)).await
     }
@@ -269,6 +270,7 @@ impl<R, T: Timebase> Port<R, T> {
         let left = instant.since(self.clock.now());
         if left > Duration::ZERO {
             sleep_until(&mut self.clock, instant).await;
+            // Only waits count: a transfer may take less than one tick of the clock.
             self.standstill.note(left, self.clock.now());
         }
     }
