@@ -27,9 +27,9 @@
 //!   check that began after the deadline. Waiting for a shared bus therefore does not count against
 //!   the chip.
 //! * A chip that lost its configuration (brown-out, ESD) is reported once with
-//!   [`ChipError::Restarted`], and the next call sets it up again. Every read shows whether the
-//!   chip still holds its configuration. The reads of [`pmw3901`] and [`mpu6000`] do not, so their
-//!   drivers check once a second.
+//!   [`ChipError::Restarted`], and the next call sets it up again. With most chips every read shows
+//!   whether the chip still holds its configuration. The reads of [`pmw3901`] and [`mpu6000`] do
+//!   not, so their drivers check once a second.
 //! * No conversion is delivered twice, even when a command to the chip is corrupted on the bus.
 //! * A start may fail or be dropped at any point; the next one works from the state that it left.
 //! * `self_test` checks that the chip measures: with the chip's own test, or else with its

@@ -284,7 +284,7 @@ impl Histogram {
     /// Time of flight to the middle of the pulse in bins, modulo the laser period.
     fn travelled(&self, middle: f32, laser_start: u8) -> f32 {
         let period = self.part().period() as f32;
-        // The chip measures its reference with another start of the laser than the target.
+        // The chip may measure its reference with another start of the laser than the target.
         let start = f32::from(self.reference_start) - f32::from(laser_start);
         let zero = f32::from(self.reference_phase) / PHASES + start;
         let travelled = middle - zero;
