@@ -1,4 +1,4 @@
-//! Drivers for particular chips, each a crate of its own.
+//! Drivers for particular chips. Each is a re-export of a crate of its own.
 //!
 //! | module | part | measures | bus | implements |
 //! |---|---|---|---|---|
@@ -11,39 +11,46 @@
 //! | [`vl53l3cx`] | ST VL53L3CX | distance | I2C | [`RangeFinder`](crate::RangeFinder) |
 //! | [`nrf24l01`] | Nordic nRF24L01+ | nothing: a radio | SPI | |
 //!
-//! # How every one of them is built
-//! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its data sheet section.
-//! * A **driver** on `embedded-hal-async` and a [`Timebase`](crate::Timebase). A blocking bus goes through
-//!   [`blocking`](crate::blocking); there is no second driver for it.
+//! # Structure of a driver
+//! * A **codec** of registers, scales and formulas: pure functions and plain structs, each with its
+//!   data sheet section.
+//! * A **driver** on `embedded-hal-async` and a [`Timebase`](crate::Timebase). For a blocking bus
+//!   wrap the bus in [`blocking`](crate::blocking); there is no second driver for it.
 //!
-//! # What every one of them promises
-//! * Creating it does not touch the bus. The first `next` sets the chip up; so does `start`, for who wants to know early.
-//!   (Creating a [`vl53l3cx`] driver pulls the chip's XSHUT low, so that it is not in its neighbour's way.)
-//! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up ([`ChipError::BusTimeout`]),
-//!   and so is a chip that makes no new sample in time ([`ChipError::NoSample`]): by the last look at it that began after that time, so that
-//!   waiting for a shared bus is not the chip's.
-//! * A chip that lost its configuration (brown-out, ESD) is [`ChipError::Restarted`] once, and the next call sets it up
-//!   again. Every read brings back whether it still holds it; the [`pmw3901`]'s and the [`mpu6000`]'s do not, and
-//!   they are asked once a second.
-//! * No conversion is delivered twice, also not when a command to the chip is garbled on its way.
-//! * A start may fail or be dropped at any point; the next one begins from whatever state that left.
-//! * `self_test` says whether the chip measures at all: by the chip's own test, or else by its identity, its settings read
-//!   back and one measurement that the part can physically give. It ends in bounded time, and `next` works after it as
-//!   before. A measurement that cannot be is [`ChipError::SelfTest`]; whatever else failed has its own error. Call it on
-//!   the ground: samples are missing meanwhile.
+//! # Guarantees of every driver
+//! * Creating a driver does not touch the bus. The first `next` sets the chip up; call `start` to
+//!   detect a fault earlier. (Creating a [`vl53l3cx`] driver pulls the chip's XSHUT pin low, so
+//!   that the chip does not occupy the address of another one.)
+//! * A transfer that takes longer than its length allows ([`TransferLimit`]) is given up with
+//!   [`ChipError::BusTimeout`].
+//! * A chip that makes no new sample in time is reported with [`ChipError::NoSample`], after a last
+//!   check that began after the deadline. Waiting for a shared bus therefore does not count against
+//!   the chip.
+//! * A chip that lost its configuration (brown-out, ESD) is reported once with
+//!   [`ChipError::Restarted`], and the next call sets it up again. With most chips every read shows
+//!   whether the chip still holds its configuration. The reads of [`pmw3901`] and [`mpu6000`] do
+//!   not, so their drivers check once a second.
+//! * No conversion is delivered twice, even when a command to the chip is corrupted on the bus.
+//! * A start may fail or be dropped at any point; the next one works from the state that it left.
+//! * `self_test` checks that the chip measures: with the chip's own test, or else with its
+//!   identification, its settings read back, and one measurement within the physical range of the
+//!   part. It ends in bounded time, and `next` works after it as before. A measurement out of range
+//!   is [`ChipError::SelfTest`]; other faults have their own errors. Call it on the ground only,
+//!   because the driver delivers no samples meanwhile.
 //!
-//! # What they expect of the board
-//! A register is written in one piece on I2C, whatever a bus does between the operations of a transaction: Linux and some controllers start
-//! again there. On SPI the chip select stays low for a whole transaction, as `SpiDevice` asks.
+//! # Requirements on the board
+//! On I2C a register is written as one message, because Linux and some controllers send a repeated
+//! start between the operations of a transaction. On SPI the chip select must stay low for a whole
+//! transaction, as the contract of `SpiDevice` requires.
 //!
-//! On a shared SPI every chip select has to be high before the first transfer to any chip: one that floats low answers
-//! into its neighbour's data.
+//! On a shared SPI bus every chip select must be high before the first transfer to any chip. A chip
+//! whose floating select is low drives the data line during its neighbour's transfers.
 //!
 //! # Recovery of the bus
-//! Drivers share a bus with others, so they do not clock a stuck slave free or reset the peripheral: that is the
-//! bus owner's work, with [`recover_i2c`](crate::recover_i2c). A driver reports [`ChipError::Bus`] or
-//! [`ChipError::BusTimeout`] for one call and tries again at the next; a board that sees those from every device of a
-//! bus recovers the bus.
+//! Drivers share their bus, so they neither clock a stuck device free nor reset the peripheral. The
+//! owner of the bus does that, with [`recover_i2c`](crate::recover_i2c). A driver returns
+//! [`ChipError::Bus`] or [`ChipError::BusTimeout`] for one call and tries again at the next. A
+//! board that gets these errors from every device of a bus recovers the bus.
 
 pub use stampfly_driver_core::chip::{
     Axis, AxisMap, ChipError, I2cRegisters, Port, Registers, SpiRegisters, TransferLimit, Wires, bounded,

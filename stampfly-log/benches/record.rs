@@ -1,4 +1,4 @@
-//! What recording costs: `cargo bench -p stampfly-log`.
+//! Time to hash, write and read records: `cargo bench -p stampfly-log`.
 
 use criterion::{Criterion, Throughput};
 use stampfly_log::FlightHash;
@@ -7,7 +7,7 @@ use stampfly_types::messages::{ImuData, StateEstimate};
 use stampfly_types::{Instant, Message};
 use std::hint::black_box;
 
-/// Takes everything and forgets it.
+/// Discards everything.
 struct Nowhere;
 
 impl Sink for Nowhere {

@@ -1,4 +1,4 @@
-//! Writes a small flight log, to look at with public tools:
+//! Writes a small flight log for inspection with public tools:
 //!
 //! ```sh
 //! cargo run -p stampfly-log --example write_log -- flight.ulg
@@ -17,7 +17,7 @@ const TOPICS: &[Topic] = &[
     Topic { name: "sensor_imu", fields: ImuData::FIELDS },
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
     Topic { name: "flight_status", fields: FlightStatus::FIELDS },
-    // A second battery: of one name, and so the second instance of one topic.
+    // A second battery. Topics with the same name become instances of one topic.
     Topic { name: "sensor_power", fields: PowerData::FIELDS },
 ];
 const IMU: usize = 0;
@@ -26,7 +26,7 @@ const MODE: usize = 2;
 const SECOND_POWER: usize = 3;
 const ACTIVATIONS: &[ActivationTopic] = &[ActivationTopic { name: "estimation", index: 0, inputs: 1 }];
 
-/// On a vehicle this is a radio link or a ring of memory; here it is a file.
+/// A file. On a vehicle the sink is a radio link or a ring buffer in memory.
 struct Disk(BufWriter<File>);
 
 impl Sink for Disk {

@@ -1,8 +1,9 @@
-//! A log as CSV: a header with the names of the fields, then one line per message of one type.
+//! CSV logs: a header with the names of the fields, then one line per message of one type.
 //!
-//! For tools and people, and small enough to replay from: every number reads back as the same bits. Enumerations are their
-//! numbers, truth values 0 or 1, times microseconds. One type of message per file; use [`ulog`](crate::ulog) for a log of
-//! many topics. Messages with vectors have no CSV.
+//! For tools and people, and accurate enough for a replay: every number reads back as the same
+//! bits. Enumerations are written as numbers, truth values as 0 or 1, times as microseconds. A file
+//! holds one type of message; for a log of several topics use [`ulog`](crate::ulog). Messages with
+//! vectors or other fields of several elements cannot be written as CSV.
 //!
 //! ```
 //! use stampfly_log::csv;
@@ -18,13 +19,13 @@
 use core::fmt::{Result as Written, Write};
 use stampfly_types::{Message, text};
 
-/// Why a line is no message.
+/// Reason why a line is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CsvError {
     /// Too few or too many columns.
     Columns,
-    /// A text that is no value of its column, or a number that is not finite.
+    /// A text that is not a value of its column, or a number that is not finite.
     Value,
 }
 
@@ -42,7 +43,7 @@ impl core::error::Error for CsvError {}
 /// Writes the header and a line feed.
 ///
 /// # Errors
-/// When `out` refuses.
+/// When `out` fails.
 pub fn write_header<M: Message>(out: &mut impl Write) -> Written {
     for (column, field) in M::FIELDS.iter().enumerate() {
         out.write_str(if column == 0 { "" } else { "," })?;
@@ -54,7 +55,7 @@ pub fn write_header<M: Message>(out: &mut impl Write) -> Written {
 /// Writes one message and a line feed.
 ///
 /// # Errors
-/// When `out` refuses, or a field has several elements.
+/// When `out` fails, or a field has several elements.
 pub fn write_line<M: Message>(message: &M, out: &mut impl Write) -> Written {
     for (column, (field, words)) in text::fields::<M>(&message.to_words()).enumerate() {
         out.write_str(if column == 0 { "" } else { "," })?;
@@ -63,34 +64,35 @@ pub fn write_line<M: Message>(message: &M, out: &mut impl Write) -> Written {
     out.write_str("\n")
 }
 
-/// Writes a whole log: the header, and a line for each message.
+/// Writes a whole log: the header, and one line for each message.
 ///
 /// # Errors
-/// As [`write_line`].
+/// Those of [`write_line`].
 pub fn write<'m, M: Message>(messages: impl IntoIterator<Item = &'m M>, out: &mut impl Write) -> Written {
     write_header::<M>(out)?;
     messages.into_iter().try_for_each(|message| write_line(message, out))
 }
 
-/// Reads a whole log. `None` when it does not begin with the header of such messages.
+/// Reads a whole log. `None` when it does not begin with the header of this type of message.
 pub fn read<M: Message>(text: &str) -> Option<impl Iterator<Item = Result<M, CsvError>>> {
     let mut lines = text.lines();
     lines.next().is_some_and(is_header::<M>).then(|| lines.map(read_line))
 }
 
-/// Is this the header of messages of this type, with or without its line feed?
+/// Whether the line is the header of this type of message, with or without a line feed.
 #[must_use]
 pub fn is_header<M: Message>(line: &str) -> bool {
     line.trim_end().split(',').eq(M::FIELDS.iter().map(|field| field.name))
 }
 
-/// Reads one line, with or without its line feed.
+/// Reads one line, with or without a line feed.
 ///
 /// # Errors
-/// When it is no such message.
+/// When the columns are not those of this type of message, or a value is invalid.
 pub fn read_line<M: Message>(line: &str) -> Result<M, CsvError> {
     let mut columns = line.trim_end().split(',');
     let message: Option<M> = text::read(|_| columns.next().ok_or(CsvError::Columns))?;
+    // `f32::from_str` accepts "inf" and "NaN", which no message may contain.
     let message = message.filter(text::is_finite).ok_or(CsvError::Value)?;
     if columns.next().is_none() { Ok(message) } else { Err(CsvError::Columns) }
 }

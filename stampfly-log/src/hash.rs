@@ -1,33 +1,38 @@
-//! One 64-bit number for everything a flight published.
+//! A 64-bit hash of everything that a flight published.
 //!
-//! Two flights with the same hash published the same words, with the same stamps, in the same order: that is how
-//! a replay, another machine or another build profile proves itself. Not a cryptographic hash (anybody can forge
-//! one) and not a checksum for files.
+//! Two flights with the same hash published the same words, with the same stamps, in the same
+//! order. Compare hashes to verify a replay, another machine or another build profile. Not a
+//! cryptographic hash: a collision is easy to construct. Not a checksum for files.
 //!
-//! # How it works
-//! Two 64-bit lanes take turns; each step is `lane = rotate(lane ^ value * SPREAD) * MULTIPLIER`, the shape of the
-//! rounds of xxHash. Every step is a bijection of the lane for a given value, and of the value for a given lane.
-//! Hence two flights that differ in one word, one stamp, one generation or one topic **always** have different
-//! hashes; for more than one difference the odds of not noticing are about 2⁻⁶⁴. The value is multiplied before
-//! it enters because the top bit of a lane alone survives a multiplication as one bit, which a second difference
-//! could undo. Only wrapping 64-bit arithmetic is used, so the result is the same on every machine. Two lanes
-//! because a lane must wait for its own multiplication, and four would not fit into the registers of a 32-bit core.
+//! # Algorithm
+//! Two 64-bit lanes alternate. Each step is `lane = rotate(lane ^ value * SPREAD) * MULTIPLIER`,
+//! the shape of the rounds of xxHash. A step is a bijection of the lane for a given value, and of
+//! the value for a given lane. Two flights that differ in one word, one stamp, one generation or
+//! one topic therefore **always** have different hashes. With more than one difference the
+//! probability of equal hashes is about 2⁻⁶⁴.
 //!
-//! A message enters as: lane A takes topic (bits 0–15), number of words (16–31) and generation (32–63); lane B
-//! takes the stamp; then pairs of words, low word first, go to A, B, A, … An odd last word is paired with zero.
+//! The value is multiplied before it enters: the top bit of a lane survives a multiplication as a
+//! single bit, which a second difference could cancel. All arithmetic is wrapping 64-bit
+//! arithmetic, so the result is the same on every machine. There are two lanes because a lane has
+//! to wait for its own multiplication; four lanes would not fit into the registers of a 32-bit
+//! core.
+//!
+//! A message enters as follows. Lane A takes the topic (bits 0–15), the number of words (16–31) and
+//! the generation (32–63); lane B takes the stamp. Then pairs of words, low word first, go to A, B,
+//! A, … An odd last word is paired with zero.
 
 use stampfly_types::Instant;
 
-/// Start values: 64 bits of the fraction of √2 and of √3.
+/// Start values: 64 bits of the fractions of √2 and √3.
 const SEED: [u64; 2] = [0x6a09_e667_f3bc_c908, 0xbb67_ae85_84ca_a73b];
 /// Odd multipliers of the lanes: 64 bits of the fractions of √5 and √7, lowest bit set.
 const MULTIPLIER: [u64; 2] = [0x3c6e_f372_fe94_f82b, 0xa54f_f53a_5f1d_36f1];
 /// Odd multiplier of the values: 64 bits of the fraction of √11, lowest bit set.
 const SPREAD: u64 = 0x510e_527f_ade6_82d1;
-/// Rotations that bring the well mixed high bits down.
+/// Rotations that move the well-mixed high bits to low positions.
 const ROTATION: [u32; 2] = [29, 37];
 
-/// Running hash of a flight.
+/// The hash of a flight, updated with every message.
 ///
 /// ```
 /// use stampfly_log::FlightHash;
@@ -54,20 +59,23 @@ impl Default for FlightHash {
 }
 
 impl FlightHash {
-    /// The hash of a flight that has published nothing yet.
+    /// The hash of a flight that has published nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self { lanes: SEED, messages: 0 }
     }
 
-    /// Takes one published message: its place in the topic table, its generation, its stamp, its words.
+    /// Adds one published message: its index in the topic table, its generation, its stamp, its
+    /// words.
     #[inline]
     pub fn publish(&mut self, topic: u16, generation: u32, at: Instant, words: &[u32]) {
         let [mut a, mut b] = self.lanes;
-        // Sixteen bits of length are enough to keep "no word" and "word zero" apart.
+        // Sixteen bits of the length suffice to distinguish a missing word from a zero word.
         let length = words.len() as u16;
         a = step::<0>(a, pair((u32::from(length) << 16) | u32::from(topic), generation));
         b = step::<1>(b, at.as_micros());
+        // Four words at a time, two for each lane, so that the multiplications of the lanes
+        // overlap.
         let (fours, rest) = words.as_chunks::<4>();
         for &[w0, w1, w2, w3] in fours {
             a = step::<0>(a, pair(w0, w1));
@@ -86,21 +94,22 @@ impl FlightHash {
         self.messages = self.messages.wrapping_add(1);
     }
 
-    /// Messages taken so far.
+    /// Number of messages added, modulo 2⁶⁴.
     #[must_use]
     pub const fn messages(&self) -> u64 {
         self.messages
     }
 
-    /// The hash of everything published so far. Publishing may go on afterwards.
+    /// The hash of everything published so far. More messages may be added afterwards.
     #[must_use]
     pub const fn finish(&self) -> u64 {
-        // Each lane is avalanched by a bijection before they meet, so a difference in one lane alone survives.
+        // A bijection mixes each lane before the two are combined, so a difference in one lane is
+        // preserved.
         avalanche(self.lanes[0]) ^ avalanche(self.lanes[1]).rotate_left(32)
     }
 }
 
-/// Two words as one value, the first one low.
+/// Two words as one value, the first one in the low half.
 #[inline]
 const fn pair(low: u32, high: u32) -> u64 {
     low as u64 | (high as u64) << 32
@@ -111,7 +120,8 @@ const fn step<const LANE: usize>(lane: u64, value: u64) -> u64 {
     (lane ^ value.wrapping_mul(SPREAD)).rotate_left(ROTATION[LANE]).wrapping_mul(MULTIPLIER[LANE])
 }
 
-/// Spreads every input bit over all output bits; xor-shifts and odd multiplications can each be undone.
+/// Spreads every input bit over all output bits. A bijection, because xor-shifts and odd
+/// multiplications are invertible.
 const fn avalanche(mut lane: u64) -> u64 {
     lane = (lane ^ (lane >> 32)).wrapping_mul(MULTIPLIER[0]);
     lane = (lane ^ (lane >> 29)).wrapping_mul(MULTIPLIER[1]);
@@ -139,8 +149,8 @@ mod tests {
         prop::collection::vec(message, 1..8)
     }
 
-    /// Golden values, computed with a Python transcription of the module's text. Changing one breaks every stored
-    /// flight hash.
+    /// Golden values, computed with a Python transcription of the module documentation. Changing
+    /// one invalidates every stored flight hash.
     #[test]
     fn the_definition_is_pinned() {
         assert_eq!(hash(&[]), GOLDEN_EMPTY);

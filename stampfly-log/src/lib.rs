@@ -1,21 +1,22 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The parts
-//! The flight record: what happened, in a file that public tools open and that a replay can trust.
+//! # Modules
+//! The flight record in a file format that public tools open and a replay reproduces exactly.
 //!
-//! | module | what it is | when to use it |
+//! | module | contents | use it |
 //! |---|---|---|
-//! | [`ulog`] | writer and reader of ULog, the file format of PX4 | every flight log, on the vehicle and on a host |
-//! | [`csv`] | one type of message as CSV that reads back bit for bit | small logs for tools and people |
-//! | [`trace`] | what each activation of a runnable saw | when a log must replay bit for bit |
-//! | [`hash`] | one 64-bit number for a whole flight | to ask whether two flights were the same |
-//! | [`plain()`] | text from a file without what a terminal obeys | to print a name that a log's writer chose |
+//! | [`ulog`] | writer and reader of ULog, the file format of PX4 | for every flight log, on the vehicle and on a host |
+//! | [`csv`] | lossless CSV for one type of message | for small logs for tools and people |
+//! | [`trace`] | the inputs that each activation of a runnable has read | when a log must replay bit for bit |
+//! | [`hash`] | one 64-bit number for a whole flight | to check whether two flights were identical |
+//! | [`plain()`] | text with escaped control characters | to print names from a log on a terminal |
 //!
-//! Nothing here does input or output, allocates or reads a clock: the writer hands finished messages to a
-//! [`ulog::Sink`], the reader walks over a byte slice. Samples are written from the 32-bit words of
-//! [`stampfly_types::Message`] without loss, NaN payloads included, and read back as the same words.
+//! Nothing here does input or output, allocates or reads a clock: the writer passes finished
+//! messages to a [`ulog::Sink`], and the reader iterates over a byte slice. Samples are written
+//! from the 32-bit words of [`stampfly_types::Message`] and read back as the same words, NaN
+//! payloads included.
 //!
-//! Not here: column-wise series, plots and other things that need an allocator; those live in the host program.
+//! Time series by column, plots and other functions that need an allocator are in the host program.
 //!
 //! # Example
 //! ```
@@ -51,6 +52,6 @@ pub mod ulog;
 
 pub use hash::FlightHash;
 pub use plain::{Plain, plain};
-/// Messages, time, vectors: the words that signatures here are written in.
+/// Messages, time and vectors, which appear in signatures of this crate.
 pub use stampfly_types as types;
 pub use trace::ActivationTopic;

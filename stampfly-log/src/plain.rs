@@ -1,17 +1,16 @@
-//! Text from a file, for a terminal.
+//! Text from a file, escaped for a terminal.
 //!
-//! Names and values in a log are what its writer chose. A terminal obeys some characters: escape
-//! sequences change its title or clear it, others turn the order of letters round. [`plain`] shows
-//! them instead. It is what every program of the flight stack prints foreign text with.
+//! The writer of a log chooses its names and values. Some characters control a terminal: escape
+//! sequences change its title or clear it, and others reverse the direction of the text. [`plain`]
+//! escapes them. Every program of the flight stack prints text from files with it.
 
 use core::fmt::{Display, Formatter, Result, Write};
 
-/// See [`plain`].
+/// Return type of [`plain`].
 #[derive(Clone, Copy, Debug)]
 pub struct Plain<'a>(&'a str);
 
-/// The text with every character that a terminal would obey written as `\u001b`, which is also what
-/// JSON writes.
+/// The text with every character that controls a terminal written as `\u001b`, as in JSON.
 ///
 /// ```
 /// use stampfly_log::plain;
@@ -31,7 +30,7 @@ impl Display for Plain<'_> {
     }
 }
 
-/// Controls, line separators, and what turns the direction of writing round.
+/// Control characters, line separators, and characters that change the direction of text.
 fn is_obeyed(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

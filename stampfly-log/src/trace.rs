@@ -1,44 +1,45 @@
-//! What each activation of a runnable saw: the part of a log that makes replay exact.
+//! Record of the inputs of each activation of a runnable, for exact replay.
 //!
-//! The outputs of a runnable are a function of its state, of the time it was told and of the samples it read. The
-//! samples are in the log already; this record says how far each input had been read, so a replay gives every
-//! activation the same samples again, however the threads of the flight were interleaved. A publish that was
-//! refused (a full queue) is an input too, for the publisher sees it.
+//! The outputs of a runnable are a function of its state, the time it was given and the samples it
+//! read. The log contains the samples; this record states how far each input had been read. A
+//! replay therefore gives every activation the same samples, independent of how the threads of the
+//! flight were interleaved. A refused publish (a full queue) is an input, too, because the
+//! publisher sees it.
 //!
-//! In the log every activation is a topic of its own, `activation_<name>`:
+//! In the log the activations of each runnable are a topic, `activation_<name>`:
 //!
 //! | column | meaning |
 //! |---|---|
-//! | `uint64_t timestamp` | the time the runnable was told, not the time it ran |
-//! | `uint32_t index` | its place in the schedule |
+//! | `uint64_t timestamp` | the time passed to the runnable, not the time at which it ran |
+//! | `uint32_t index` | its index in the schedule |
 //! | `uint32_t refused` | bit n: its n-th publish of this activation was refused |
-//! | `uint32_t[n] generation` | per input: number of the newest sample it has read, of now or of before |
-//! | `uint16_t[n] taken` | per input: how many samples it took this time |
+//! | `uint32_t[n] generation` | per input: generation of the newest sample read so far, in this activation or an earlier one |
+//! | `uint16_t[n] taken` | per input: number of samples read in this activation |
 //!
-//! A record is written when the runnable has read its inputs, in the order in which runnables read. When the runnable was
-//! refused something, the same record follows once more when it has finished, with `refused` filled in: it takes the place
-//! of the first.
+//! A record is written when the runnable has read its inputs, in the order in which runnables read.
+//! If a publish was refused, the record is written once more when the runnable has finished, with
+//! `refused` filled in. The second record replaces the first.
 
 use crate::ulog::{Format, Take};
 use core::fmt::{self, Write};
 use stampfly_types::activation::MAX_INPUTS;
 use stampfly_types::{ActivationRecord, InputRecord, Instant};
 
-/// The topic that holds the activations of one runnable.
+/// The topic of one runnable's activations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ActivationTopic {
     /// The runnable's name; the topic is `activation_<name>`.
     pub name: &'static str,
-    /// Its place in the schedule.
+    /// Index of the runnable in the schedule.
     pub index: u8,
-    /// How many inputs it has, at most [`MAX_INPUTS`].
+    /// Number of its inputs, at most [`MAX_INPUTS`].
     pub inputs: usize,
 }
 
-/// Topics of activations begin with this.
+/// Prefix of the names of activation topics.
 pub const TOPIC_PREFIX: &str = "activation_";
 
-/// The bytes of a record behind the number of its topic.
+/// Writes the bytes of a record that follow the topic's number.
 pub(crate) fn encode(record: &ActivationRecord, out: &mut impl FnMut(&[u8])) {
     out(&record.now.as_micros().to_le_bytes());
     out(&u32::from(record.index).to_le_bytes());
@@ -54,13 +55,14 @@ impl ActivationTopic {
         16 + self.inputs * 6
     }
 
-    /// Is this format the one a log of ours has for this runnable?
+    /// Whether the format is the one that this crate writes for this runnable.
     #[must_use]
     pub fn is_format(&self, format: &Format<'_>) -> bool {
         format.name.strip_prefix(TOPIC_PREFIX) == Some(self.name) && Self::inputs_of(format) == Some(self.inputs)
     }
 
-    /// How many inputs the activations of this format have; `None` when it is no format of activations.
+    /// Number of inputs of the activations in this format; `None` when it is not an activation
+    /// format.
     #[must_use]
     pub fn inputs_of(format: &Format<'_>) -> Option<usize> {
         format.name.strip_prefix(TOPIC_PREFIX)?;
@@ -80,13 +82,15 @@ impl ActivationTopic {
         }
     }
 
-    /// Reads a record of `inputs` inputs from its payload; `None` when it has another size.
+    /// Reads a record of `inputs` inputs from its payload; `None` when the payload has another
+    /// size.
     #[must_use]
     pub fn decode(payload: &[u8], inputs: usize) -> Option<ActivationRecord> {
         let mut take = Take(payload);
         let now = Instant::from_micros(take.u64()?);
         let mut record = ActivationRecord::new(u8::try_from(take.u32()?).ok()?, now);
         record.refused = take.u32()?;
+        // The generations of all inputs precede the numbers of samples.
         let mut taken = Take(take.0.get(inputs.checked_mul(4)?..)?);
         for _ in 0..inputs {
             record.push(InputRecord { generation: take.u32()?, taken: taken.u16()? }).ok()?;

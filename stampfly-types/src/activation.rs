@@ -1,25 +1,28 @@
-//! What one activation of a runnable saw: the record that makes a flight repeatable.
+//! Record of the inputs of one activation of a runnable, for repeatable replay.
 //!
-//! The outputs of a runnable are a function of its state, of the instant it was told and of the samples it read. The
-//! samples are in the log; this record says how far each input had been read, so that a replay hands every activation
-//! the same samples, however the threads of the flight interrupted each other. A refused publish (a full queue) is an
-//! input too, because the publisher sees it.
+//! The outputs of a runnable are a function of its state, the instant it was given and the samples
+//! it read. The log stores the samples; this record states how far each input had been read. A
+//! replay therefore gives every activation the same samples, independent of how the threads of the
+//! flight preempted each other. A refused publish (a full queue) is an input, too, because the
+//! publisher sees it.
 //!
-//! The bus fills the record in, the log stores it, a replay hands it back to the bus. It lives here because bus and log
-//! do not depend on each other. Not a profiler: it says nothing about how long anything took.
+//! The bus fills the record in, the log stores it, and a replay returns it to the bus. It is part
+//! of this crate because bus and log do not depend on each other. Not for profiling: it contains no
+//! execution times.
 
 use crate::Instant;
 
-/// Most inputs of one runnable.
+/// Maximum number of inputs of one runnable.
 pub const MAX_INPUTS: usize = 16;
 
-/// How far one input had been read.
+/// How far one input has been read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputRecord {
-    /// Generation of the newest sample read so far, in this activation or before; zero before the first.
+    /// Generation of the newest sample read so far, in this activation or an earlier one; zero
+    /// before the first.
     pub generation: u32,
-    /// Samples taken in this activation.
+    /// Number of samples read in this activation.
     pub taken: u16,
 }
 
@@ -37,11 +40,11 @@ pub struct InputRecord {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ActivationRecord {
-    /// The runnable's line in the activation table.
+    /// Index of the runnable in the activation table.
     pub index: u8,
-    /// The instant it was told, which need not be the instant it ran.
+    /// The instant passed to the runnable. The runnable may have run later.
     pub now: Instant,
-    /// Bit n: its n-th publish on a queue was refused. Bit 31 stands for every one from the 32nd on.
+    /// Bit n: its n-th publish on a queue was refused. Bit 31 covers all from the 32nd on.
     pub refused: u32,
     inputs: [InputRecord; MAX_INPUTS],
     #[cfg_attr(feature = "serde", serde(deserialize_with = "up_to_max_inputs"))]
@@ -54,7 +57,7 @@ fn up_to_max_inputs<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result
     if usize::from(count) <= MAX_INPUTS { Ok(count) } else { Err(serde::de::Error::custom("too many inputs")) }
 }
 
-/// Only the inputs that are in use count.
+/// Compares only the inputs in use.
 impl PartialEq for ActivationRecord {
     fn eq(&self, other: &Self) -> bool {
         (self.index, self.now, self.refused, self.inputs()) == (other.index, other.now, other.refused, other.inputs())
@@ -63,7 +66,7 @@ impl PartialEq for ActivationRecord {
 
 impl Eq for ActivationRecord {}
 
-/// The record has [`MAX_INPUTS`] inputs already. Holds the one that did not fit.
+/// The record already has [`MAX_INPUTS`] inputs. Returns the one that did not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyInputs(pub InputRecord);
 
@@ -76,14 +79,14 @@ impl core::fmt::Display for TooManyInputs {
 impl core::error::Error for TooManyInputs {}
 
 impl ActivationRecord {
-    /// An activation that has not read anything yet.
+    /// An activation that has not read any input yet.
     #[inline]
     #[must_use]
     pub const fn new(index: u8, now: Instant) -> Self {
         Self { index, now, refused: 0, inputs: [InputRecord { generation: 0, taken: 0 }; MAX_INPUTS], count: 0 }
     }
 
-    /// Begins the record of another activation in the same memory.
+    /// Starts the record of another activation in the same memory.
     #[inline]
     pub const fn begin(&mut self, index: u8, now: Instant) {
         self.index = index;
@@ -95,7 +98,7 @@ impl ActivationRecord {
     /// Adds the next input, in the order of the topic table.
     ///
     /// # Errors
-    /// When there are [`MAX_INPUTS`] already; the record is unchanged.
+    /// When there are [`MAX_INPUTS`] inputs already. The record is unchanged then.
     #[inline]
     pub fn push(&mut self, input: InputRecord) -> Result<(), TooManyInputs> {
         let place = self.inputs.get_mut(usize::from(self.count)).ok_or(TooManyInputs(input))?;
@@ -104,16 +107,20 @@ impl ActivationRecord {
         Ok(())
     }
 
-    /// Places for all inputs at once, in the order of the topic table, in place of what is there: what is known while compiling to fit
-    /// needs no check. They hold what an earlier activation has read until they are written. Always `Some`.
+    /// Replaces the inputs with `N` slots to be filled in the order of the topic table. Always
+    /// `Some`.
+    ///
+    /// Faster than [`push`](Self::push): the length is checked at compile time. Until they are
+    /// written, the slots hold the values of an earlier activation.
     #[inline]
     pub const fn places<const N: usize>(&mut self) -> Option<&mut [InputRecord; N]> {
         const { assert!(N <= MAX_INPUTS, "an activation has at most MAX_INPUTS inputs") };
+        // The assertion bounds N, so the cast is exact and the slice exists.
         self.count = N as u8;
         self.inputs.first_chunk_mut()
     }
 
-    /// The inputs, in the order they were added.
+    /// The inputs, in the order in which they were added.
     #[inline]
     #[must_use]
     pub fn inputs(&self) -> &[InputRecord] {

@@ -1,12 +1,14 @@
-//! Height from air pressure, for whoever has a barometer: [`BaroData`](crate::messages::BaroData) holds both.
+//! Pressure altitude, for drivers of barometers.
 //!
-//! Use it to fill `BaroData::altitude` from a driver that tells pressure only. It is an altitude above a pressure, not above the
-//! sea: weather moves it by tens of metres, and estimators take its offset for unknown.
+//! Use it to fill `altitude` of [`BaroData`](crate::messages::BaroData) in a driver that measures
+//! pressure only. The result is the height above a pressure, not above the sea: weather shifts it
+//! by tens of metres, and estimators treat its offset as unknown.
 
 use crate::math;
 
-/// Pressure altitude above 101 325 Pa in the standard atmosphere (ICAO doc 7488, troposphere), m. Good to half a metre up to a
-/// kilometre; not a number for a pressure below zero.
+/// Height above the level of 101 325 Pa in the standard atmosphere (ICAO doc 7488, troposphere), m.
+///
+/// Accurate to half a metre up to a kilometre. NaN for a pressure below zero.
 ///
 /// ```
 /// use stampfly_types::{messages::BaroData, pressure_altitude};

@@ -1,9 +1,10 @@
-//! The larger and the smaller of two numbers, as every machine finds them.
+//! Maximum and minimum of two numbers with the same result on every target.
 //!
-//! `f32::max` and `f32::min` are calls of ten instructions on cores whose FPU compares and does not choose, such as a Cortex-M4F's, and
-//! leave it to the machine which of two zeros comes out. Use them where nobody waits, and these in what flies.
+//! `f32::max` and `f32::min` are calls of ten instructions on cores whose FPU has a comparison but
+//! no selection, such as the Cortex-M4F, and the target chooses which of two zeros they return. Use
+//! these functions in flight code; in tools the standard library's are fine.
 
-/// The larger of two numbers, the second of two equal ones. One that is no number is passed over.
+/// The larger of two numbers; the second when both are equal. Ignores a NaN unless both are.
 ///
 /// ```
 /// use stampfly_types::math::larger;
@@ -16,7 +17,7 @@ pub const fn larger(a: f32, b: f32) -> f32 {
     if a > b || b.is_nan() { a } else { b }
 }
 
-/// The smaller of two numbers, the second of two equal ones. One that is no number is passed over.
+/// The smaller of two numbers; the second when both are equal. Ignores a NaN unless both are.
 ///
 /// ```
 /// use stampfly_types::math::smaller;

@@ -1,4 +1,4 @@
-//! Values that can stand in a message, and how each becomes 32-bit words.
+//! Types that can be fields of a message, and their conversion to 32-bit words.
 //!
 //! | value | words |
 //! |---|---|
@@ -6,37 +6,41 @@
 //! | `f64`, `u64`, `i64`, [`Instant`], [`Duration`] | 2, the low one first |
 //! | [`Vec3`], [`Quat`] | 3, and 4 in the order w, x, y, z |
 //! | `[T; N]` | N times those of `T`, for any N |
-//! | `Option<T>` | 1 that says whether there is a value, then those of `T`, zero when there is none |
+//! | `Option<T>` | 1 for the presence, 0 or 1, then those of `T`, zero when absent |
 //! | a message | those of its fields |
 //!
-//! Implemented by [`message!`](crate::message!), [`message_enum!`](crate::message_enum!) and
-//! [`message_flags!`](crate::message_flags!) for what they declare. Implement [`Field`] by hand for a type of your own
-//! whose words another `Field` already describes, as [`Instant`] is stored like a `u64`.
+//! The macros [`message!`](crate::message!), [`message_enum!`](crate::message_enum!) and
+//! [`message_flags!`](crate::message_flags!) implement [`Field`] for the types they declare.
+//! Implement it manually for a type of your own that is stored like another `Field`, as [`Instant`]
+//! is stored like a `u64`.
 
 use crate::schema::FieldKind;
 use crate::{Duration, Instant, Quat, Vec3};
 
-/// One value inside a message: how many words it takes, and how to write and read them.
+/// A value inside a message with a fixed number of words.
 pub trait Field: Copy {
-    /// How one element is stored in the log.
+    /// Storage of one element in the log.
     const KIND: FieldKind;
-    /// How many elements of `KIND`.
+    /// Number of elements of `KIND`.
     const COUNT: usize;
-    /// How many 32-bit words, all elements together.
+    /// Number of 32-bit words of all elements together.
     const SIZE: usize;
 
-    /// The value a new message has here. [`Default`] cannot be asked for it: long arrays have none.
+    /// The value in a new message. Not [`Default`], which long arrays do not implement.
     fn initial() -> Self;
 
-    /// Writes exactly [`Self::SIZE`] words. Words that do not fit are dropped.
+    /// Writes exactly [`Self::SIZE`] words. When `words` is shorter, an implementation writes only
+    /// the elements that fit.
     fn write(&self, words: &mut [u32]);
 
-    /// Reads the value back; `None` when the words are no such value (a bool of 2, an unknown variant, too few words).
+    /// Reads the value back. `None` when the words do not encode a value: a `bool` of 2, an unknown
+    /// variant, too few words.
     fn read(words: &[u32]) -> Option<Self>;
 }
 
-/// Implements [`Field`] for a type that is always the same number of words: kind and number of its elements, the value as
-/// words, the words as a value. For this file and the macros that declare types with names.
+/// Implements [`Field`] for a type with a fixed number of elements, from the element's kind, their
+/// number, and the conversions to and from words. For this file and the macros that declare named
+/// values.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __field {
@@ -65,7 +69,7 @@ macro_rules! __field {
     };
 }
 
-/// Scalars: a list of what [`__field!`] takes, for one element.
+/// Implements [`Field`] for scalars. Each line has the arguments of [`__field!`] for one element.
 macro_rules! scalars {
     ($($Type:ty, $kind:ident, |$value:ident| $write:expr, |$words:pat_param| $read:expr;)*) => {
         $(crate::__field!($Type, FieldKind::$kind, 1, |$value| $write, |$words| $read);)*
@@ -88,7 +92,7 @@ scalars! {
     Duration, U64, |v| split(v.as_micros()), |w| Some(Duration::from_micros(join(w)));
 }
 
-/// The low word, then the high one.
+/// The low word, then the high word.
 #[inline]
 const fn split(bits: u64) -> [u32; 2] {
     [bits as u32, (bits >> 32) as u32]
@@ -103,7 +107,7 @@ crate::__field!(Vec3, FieldKind::F32, 3, |v| v.to_array().map(f32::to_bits), |wo
     Some(Vec3::from(<[u32; 3]>::map(words, f32::from_bits)))
 });
 
-// Stored w, x, y, z. A broken log cannot bring in a unit quaternion that is none.
+// Stored as w, x, y, z. Reading checks the length, so a corrupt log yields no invalid attitude.
 crate::__field!(Quat, FieldKind::F32, 4, |v| v.wxyz().map(f32::to_bits), |words| {
     Quat::try_from(<[u32; 4]>::map(words, f32::from_bits)).ok()
 });
@@ -138,7 +142,7 @@ impl<T: Field, const N: usize> Field for [T; N] {
     }
 }
 
-/// Words of an absent value that are not zero are refused: the same value always has the same words.
+/// Reading refuses non-zero words of an absent value, so that each value has exactly one encoding.
 impl<T: Field> Field for Option<T> {
     const KIND: FieldKind = FieldKind::Option { kind: &T::KIND, count: T::COUNT };
     const COUNT: usize = 1;
@@ -175,7 +179,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec;
 
-    /// Writes into words that are not zero before, reads back; one word less is refused.
+    /// Writes into words that are not zero, reads back, and checks that one word less is refused.
     fn round_trip<T: Field + PartialEq + Debug>(value: T) -> Result<(), TestCaseError> {
         let mut words = vec![0xDEAD_BEEF; T::SIZE];
         value.write(&mut words);

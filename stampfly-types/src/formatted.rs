@@ -1,9 +1,12 @@
-//! Messages and their fields for [defmt](https://defmt.ferrous-systems.com), behind the feature `defmt`.
+//! [defmt](https://defmt.ferrous-systems.com) support for messages and their fields, behind the
+//! feature `defmt`.
 //!
-//! What is sent is the text that `Debug` writes: the macros that declare messages ask nothing of the types of their fields, so another
-//! crate's messages compile with and without the feature. Not for the flight record: that has its own format.
+//! The output is the text of `Debug`, so the macros that declare messages require nothing of the
+//! fields' types, and messages of other crates compile with and without the feature. Not for the
+//! flight record, which has a format of its own.
 
-/// Makes a message, an enumeration or a set of bits printable where this crate's feature `defmt` is on.
+/// Implements `defmt::Format` for a message, an enumeration or a set of flags when the feature
+/// `defmt` of this crate is on.
 #[cfg(feature = "defmt")]
 #[doc(hidden)]
 #[macro_export]
@@ -27,7 +30,7 @@ macro_rules! __defmt {
 #[cfg(feature = "defmt")]
 pub use defmt::{Format, Formatter};
 
-/// Sends what `Debug` writes.
+/// Formats a value with its `Debug` implementation.
 #[cfg(feature = "defmt")]
 pub fn debug<T: core::fmt::Debug>(value: &T, f: Formatter<'_>) {
     defmt::write!(f, "{}", defmt::Debug2Format(value));

@@ -1,15 +1,16 @@
-//! Vectors, quaternions and how the stack orients them.
+//! Vectors, quaternions and the frames they refer to.
 //!
 //! | frame | x | y | z |
 //! |---|---|---|---|
 //! | body (FRD) | forward | right | down |
 //! | world (NED) | north | east | down |
 //!
-//! An attitude is the unit quaternion that turns body vectors into world vectors: `world = q * body`. Roll, pitch
-//! and yaw are the aerospace sequence (yaw first about z, then pitch about y, then roll about x) and exist for
-//! people and plots; no control law uses them, because they are singular at ±90° of pitch.
+//! An attitude is the unit quaternion that turns body vectors into world vectors:
+//! `world = q * body`. Roll, pitch and yaw are the aerospace sequence (yaw first about z, then
+//! pitch about y, then roll about x). They are for people and plots. No control law uses them,
+//! because they are singular at ±90° of pitch.
 
-/// An operation by value, and for references that iterators and closures hand out.
+/// Implements a binary operator for values and for references, which iterators and closures yield.
 macro_rules! operator {
     ($Trait:ident, $function:ident, $Left:ty, $Right:ty, $Output:ty, |$left:ident, $right:ident| $result:expr) => {
         impl $Trait<$Right> for $Left {
@@ -72,10 +73,11 @@ pub const GRAVITY: f32 = 9.806_65;
 #[must_use]
 pub fn roll_pitch_yaw(attitude: &Quat) -> [f32; 3] {
     let [w, x, y, z] = attitude.wxyz();
+    // `math::asin` clamps its argument, which rounding can push beyond ±1 near vertical pitch.
     [math::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math::asin(2.0 * (w * y - z * x)), yaw(attitude)]
 }
 
-/// Heading of an attitude, radians, zero north and positive to the east.
+/// Heading of an attitude, radians: zero is north, positive is east.
 #[cfg(feature = "math")]
 #[must_use]
 pub fn yaw(attitude: &Quat) -> f32 {
@@ -97,8 +99,8 @@ pub fn tilt(attitude: &Quat) -> f32 {
     2.0 * math::atan2(math::sqrt(x * x + y * y), math::sqrt(w * w + z * z))
 }
 
-/// Cosine of [`tilt`]: what to compare with a limit, because it takes no root and no arc tangent. Not for a tilt near zero,
-/// whose cosine hardly changes.
+/// Cosine of [`tilt`]. Cheaper than the angle for a comparison with a limit, because it needs
+/// neither a root nor an arc tangent. Not for tilts near zero, where the cosine hardly changes.
 ///
 /// ```
 /// use stampfly_types::{Quat, frame::cos_tilt};
@@ -110,7 +112,7 @@ pub fn cos_tilt(attitude: &Quat) -> f32 {
     1.0 - 2.0 * (x * x + y * y)
 }
 
-/// The attitude with this heading and no tilt.
+/// The level attitude with this heading, radians.
 #[cfg(feature = "math")]
 #[must_use]
 pub fn from_yaw(yaw: f32) -> Quat {

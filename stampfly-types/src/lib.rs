@@ -1,24 +1,24 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The parts
-//! The vocabulary of the StampFly flight stack.
+//! # Modules
+//! Vocabulary of the StampFly flight stack. The crates of components (estimator, controller, bus,
+//! log, drivers and others) depend on this crate and not on each other, so definitions that two of
+//! them share are here:
 //!
-//! Every other crate of the family depends on this one and on none of its siblings, so what two crates
-//! must agree on lives here and nothing else does:
-//!
-//! * [`time`]: [`Instant`] and [`Duration`], the only time there is;
-//! * [`frame`]: vectors, quaternions and the conventions they follow;
-//! * [`math`]: the one door to transcendental functions;
-//! * [`mod@message`]: what can travel on the bus and into the log, declared with [`message!`]; [`field`]: of which values
-//!   it is made; [`schema`]: what its words mean;
-//! * [`messages`]: the messages themselves, sensor to motor;
-//! * [`activation`]: the record of what a runnable read, for the log and for replay;
-//! * [`text`]: a message as text, field by field.
+//! * [`time`]: [`Instant`] and [`Duration`], the only types for time;
+//! * [`frame`]: vectors, quaternions and their conventions;
+//! * [`math`]: transcendental functions with the same result on every target;
+//! * [`mod@message`]: the structs that travel on the bus and into the log, declared with
+//!   [`message!`]; [`field`]: the types of their fields; [`schema`]: the description of their
+//!   words;
+//! * [`messages`]: the messages of the flight stack, from sensor to motor;
+//! * [`activation`]: the record of the inputs a runnable has read, for log and replay;
+//! * [`text`]: messages as text, field by field.
 //!
 //! # Conventions
-//! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED, attitude as the
-//! quaternion that turns body vectors into world vectors. An accelerometer measures specific force: level
-//! and still it reads (0, 0, −9.81) m/s².
+//! SI units and radians. Body frame FRD (x forward, y right, z down), world frame NED. An attitude
+//! is the quaternion that turns body vectors into world vectors. An accelerometer measures specific
+//! force: level and at rest it reads (0, 0, −9.81) m/s².
 //!
 //! # Example
 //! ```

@@ -1,11 +1,13 @@
-//! The one door to transcendental maths.
+//! Transcendental functions with the same result on every target.
 //!
-//! The functions of two C libraries differ in the last bit (glibc and `libm` disagree on 1.3 % of sines and
-//! 9.7 % of exponentials), so a flight recorded on one machine would not replay on another. Everything in the
-//! family calls these wrappers instead, on every target; clippy refuses the platform's own. Arguments outside a
-//! function's domain are clamped to it, because a value rounded to 1.0000001 must not become NaN in flight.
+//! The functions of two C libraries differ in the last bit: glibc and `libm` disagree on 1.3 % of
+//! sines and 9.7 % of exponentials. A flight recorded on one machine would therefore not replay on
+//! another. All crates of the family call these wrappers of `libm` on every target, and clippy
+//! refuses the platform's functions. [`asin`], [`acos`] and [`sqrt`] clamp arguments outside their
+//! domain, because a ratio rounded to 1.0000001 must not become NaN in flight.
 //!
-//! Cost on x86-64: 2–10 ns each. Not for the inner loop of a filter that can use a rotation instead.
+//! Cost on x86-64: 2–10 ns each. In the inner loop of a filter, update a rotation instead where
+//! possible.
 
 pub use crate::comparison::{larger, smaller};
 pub use core::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -28,7 +30,8 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
     libm::sincosf(angle)
 }
 
-/// Sine and cosine of an angle in radians, in double precision: for degrees of latitude, of which an `f32` resolves a metre.
+/// Sine and cosine of an angle in radians, in double precision. For latitudes, of which an `f32` in
+/// degrees resolves only about a metre.
 #[must_use]
 pub fn sin_cos_f64(angle: f64) -> (f64, f64) {
     libm::sincos(angle)
@@ -58,12 +61,12 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x)
 }
 
-/// Square root; negative arguments give zero.
+/// Square root. Negative arguments give zero.
 #[inline]
 #[must_use]
 pub fn sqrt(value: f32) -> f32 {
     let value = if value < 0.0 { 0.0 } else { value };
-    // Where `libm` has the machine's instruction. The bits are the same.
+    // On these targets `libm` uses the machine's instruction. The results are identical.
     if cfg!(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
         libm::sqrtf(value)
     } else {
@@ -107,7 +110,8 @@ pub fn floor(value: f32) -> f32 {
     libm::floorf(value)
 }
 
-/// Wraps an angle into (−π, π]. Angles beyond a few thousand turns lose precision, as they do in `f32` anyway.
+/// Wraps an angle into (−π, π], radians. Beyond a few thousand turns the result loses precision, as
+/// the argument itself does in `f32`.
 ///
 /// ```
 /// use stampfly_types::math::{PI, wrap_angle};
@@ -117,6 +121,7 @@ pub fn floor(value: f32) -> f32 {
 pub fn wrap_angle(angle: f32) -> f32 {
     let turns = floor((angle + PI) / TAU);
     let wrapped = angle - turns * TAU;
+    // The subtraction rounds, and the interval is open at −π.
     if wrapped <= -PI { wrapped + TAU } else { wrapped }
 }
 

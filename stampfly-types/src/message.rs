@@ -1,39 +1,42 @@
-//! What can travel on the bus and into the log.
+//! Messages: the structs that travel on the bus and are stored in the log.
 //!
-//! A message is a plain struct that knows how to become a fixed number of 32-bit words and back. The bus moves
-//! only words, so it needs no `unsafe`; the log stores the same words; the [schema](crate::schema) that explains them
-//! ([`Message::FIELDS`]) is generated from the same declaration, with names and units.
+//! A message is a plain struct with a conversion to and from a fixed number of 32-bit words. The
+//! bus moves only words and therefore needs no `unsafe`; the log stores the same words. The
+//! [schema](crate::schema) ([`Message::FIELDS`]) is generated from the same declaration and gives
+//! the words names and units.
 //!
 //! Declare messages with [`message!`](crate::message!), enumerations with
-//! [`message_enum!`](crate::message_enum!) and bit sets with [`message_flags!`](crate::message_flags!). Do not
-//! implement [`Message`] by hand. For bytes on a radio use a codec instead: words are for inside the vehicle.
+//! [`message_enum!`](crate::message_enum!) and sets of flags with
+//! [`message_flags!`](crate::message_flags!). Do not implement [`Message`] manually. For bytes on a
+//! radio use a codec: words are for use inside the vehicle.
 
 use crate::schema::FieldInfo;
 
-/// A struct that can travel as words. Implemented by [`message!`](crate::message!) only.
+/// A struct that can be stored as words. Implemented only by [`message!`](crate::message!).
 pub trait Message: Copy + PartialEq + core::fmt::Debug + 'static {
-    /// `[u32; Self::WORDS]`.
+    /// The type `[u32; Self::WORDS]`.
     type Words: Copy + AsRef<[u32]> + AsMut<[u32]> + core::fmt::Debug + 'static;
     /// Number of words.
     const WORDS: usize;
     /// All words zero.
     const ZERO: Self::Words;
-    /// The message's type name.
+    /// Name of the struct.
     const NAME: &'static str;
-    /// The schema, in word order.
+    /// The schema, in the order of the words.
     const FIELDS: &'static [FieldInfo];
 
-    /// The message as words.
+    /// Converts the message to words.
     fn to_words(&self) -> Self::Words;
 
-    /// The message back from words; `None` when a field refuses its words.
+    /// Converts words to a message. `None` when the words of a field do not encode a value.
     fn from_words(words: &Self::Words) -> Option<Self>;
 }
 
-/// Declares a message: a plain struct, its conversion to and from words, its log schema.
+/// Declares a message: a plain struct with conversions to and from words, and a schema.
 ///
-/// Each field is `name: Type ["unit"]`, or `name: Type` where it has no dimension. A type is anything that is a
-/// [`Field`](crate::Field): numbers, vectors, instants, named values, arrays and options of those, other messages.
+/// Each field is `name: Type ["unit"]`, or `name: Type` when it has no dimension. Types are those
+/// that implement [`Field`](crate::Field): numbers, vectors, instants, named values, other
+/// messages, and arrays and options of these.
 ///
 /// ```
 /// use stampfly_types::{Message, Vec3, message};
@@ -55,7 +58,7 @@ pub trait Message: Copy + PartialEq + core::fmt::Debug + 'static {
 /// assert_eq!(Wind::from_words(&wind.to_words()), Some(wind));
 /// ```
 ///
-/// The unit of what has none is left out:
+/// A dimensionless field has no brackets:
 ///
 /// ```compile_fail
 /// stampfly_types::message! {
@@ -107,7 +110,8 @@ macro_rules! message {
             }
         }
 
-        // Evaluated here, or a schema that is refused would be found only where it is used.
+        // Evaluated here, so that an invalid schema is an error at the declaration and not only
+        // where it is used.
         const _: &[$crate::FieldInfo] = <$Name as $crate::Message>::FIELDS;
 
         impl $crate::Field for $Name {

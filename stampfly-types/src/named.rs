@@ -1,9 +1,9 @@
-//! Values with names: enumerations and sets of flags that can be fields of messages.
+//! Enumerations and sets of flags with names, for fields of messages.
 //!
-//! Both carry their names into the schema, so a log and a console show `Flying` and `LOW_BATTERY` instead of numbers.
-//! The numbers are part of every log and record: add new ones, do not change old ones.
+//! Their names are part of the schema, so a log and a console show `Flying` and `LOW_BATTERY`
+//! instead of numbers. Logs store the numbers: add new ones, and never change or reuse old ones.
 
-/// Declares an enumeration that can be a message field. `#[default]` marks the value a new message has.
+/// Declares an enumeration for a message field. `#[default]` marks the value in a new message.
 ///
 /// ```
 /// use stampfly_types::message_enum;
@@ -66,7 +66,9 @@ macro_rules! message_enum {
     };
 }
 
-/// Declares a set of named bits that can be a message field.
+/// Declares a set of named bits for a message field.
+///
+/// The documentation of each flag is also its text in `MEANINGS`.
 ///
 /// ```
 /// use stampfly_types::message_flags;
@@ -93,26 +95,26 @@ macro_rules! message_flags {
 
         impl $Name {
             $($(#[doc = $doc])* pub const $FLAG: Self = Self(1 << $bit);)*
-            /// Nothing.
+            /// The empty set.
             pub const NONE: Self = Self(0);
-            /// Every named bit.
+            /// The set of all named bits.
             pub const ALL: Self = Self(0 $(| 1 << $bit)*);
-            /// Every named bit by itself, in declaration order.
+            /// Every named bit as a set of its own, in declaration order.
             pub const EACH: &'static [Self] = &[$(Self::$FLAG),*];
-            /// Names and bit masks.
+            /// Name and bit mask of every flag.
             pub const NAMES: &'static [(&'static str, u32)] = &[$((stringify!($FLAG), 1 << $bit)),*];
-            /// Names and what they mean, as their documentation says it.
+            /// Name and documentation of every flag.
             pub const MEANINGS: &'static [(&'static str, &'static str)] = &[$((stringify!($FLAG), concat!($($doc),*))),*];
 
-            /// Does the set hold all of `other`?
+            /// Whether the set contains all of `other`.
             #[must_use]
             pub const fn contains(self, other: Self) -> bool { self.0 & other.0 == other.0 }
 
-            /// Does the set hold any of `other`?
+            /// Whether the set contains any of `other`.
             #[must_use]
             pub const fn intersects(self, other: Self) -> bool { self.0 & other.0 != 0 }
 
-            /// Is the set empty?
+            /// Whether the set is empty.
             #[must_use]
             pub const fn is_empty(self) -> bool { self.0 == 0 }
 
@@ -124,7 +126,7 @@ macro_rules! message_flags {
             #[must_use]
             pub const fn without(self, other: Self) -> Self { Self(self.0 & !other.0) }
 
-            /// The set with `other` added or removed.
+            /// The set with `other` added when `on`, or removed.
             #[must_use]
             pub const fn set(self, other: Self, on: bool) -> Self { if on { self.with(other) } else { self.without(other) } }
 
@@ -132,7 +134,7 @@ macro_rules! message_flags {
             #[must_use]
             pub const fn bits(self) -> u32 { self.0 }
 
-            /// The names in the set, in bit order of declaration.
+            /// The names in the set, in declaration order.
             pub fn names(self) -> impl Iterator<Item = &'static str> {
                 Self::NAMES.iter().filter(move |(_, mask)| self.0 & mask != 0).map(|(name, _)| *name)
             }

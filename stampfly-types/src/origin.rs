@@ -1,17 +1,19 @@
-//! Where on Earth the local frame begins.
+//! Conversion between the local frame and geographic coordinates.
 //!
-//! A vehicle with a satellite receiver knows it; one that flies in a room is told, so that a ground station can draw it on a map. The Earth is taken for
-//! flat around that place, which is wrong by a millimetre after a hundred metres and by a decimetre after a kilometre.
+//! A vehicle with a satellite receiver sets the origin itself. For one that flies indoors it is
+//! configured, so that a ground station can show the vehicle on a map. The Earth counts as flat
+//! around the origin; the error is a millimetre at a hundred metres and a decimetre at a kilometre.
 
 use crate::math;
 use core::f32::consts::PI;
 
-/// Metres in a ten-millionth of a degree of latitude, on a sphere with the equator's radius of 6 378 137 m (WGS 84).
+/// Metres per ten-millionth of a degree of latitude, on a sphere with the radius of the equator, 6
+/// 378 137 m (WGS 84).
 const METRES: f32 = 0.011_131_949;
-/// A whole turn.
+/// 360° in ten-millionths of a degree.
 const TURN: i64 = 3_600_000_000;
 
-/// A place on Earth.
+/// The geographic coordinates of the local frame's origin.
 ///
 /// ```
 /// use stampfly_types::Origin;
@@ -22,46 +24,49 @@ const TURN: i64 = 3_600_000_000;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// Ten-millionths of a degree, north is positive.
+    /// Latitude in ten-millionths of a degree, north positive.
     pub latitude: i32,
-    /// Ten-millionths of a degree, east is positive.
+    /// Longitude in ten-millionths of a degree, east positive.
     pub longitude: i32,
-    /// Above the sea, mm.
+    /// Altitude above mean sea level, mm.
     pub altitude: i32,
 }
 
 impl Origin {
-    /// Is it a place, and not so near a pole that east means nothing?
+    /// Whether the coordinates are valid and at most 89° from the equator. Nearer to a pole east is
+    /// not well defined.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.latitude.unsigned_abs() <= 890_000_000 && self.longitude.unsigned_abs() <= 1_800_000_000
     }
 
-    /// What a ten-millionth of a degree of longitude is here, m.
+    /// Metres per ten-millionth of a degree of longitude at this latitude.
     fn east(&self) -> f32 {
         METRES * math::cos(self.latitude as f32 * 1e-7 * (PI / 180.0))
     }
 
-    /// North and east of the origin, m, of this latitude and longitude in ten-millionths of a degree.
+    /// Position north and east of the origin, m, from coordinates in ten-millionths of a degree.
     #[must_use]
     pub fn local(&self, latitude: i32, longitude: i32) -> [f32; 2] {
         let north = i64::from(latitude) - i64::from(self.latitude);
-        // The shorter way round.
+        // Across the 180th meridian: take the shorter way around the Earth.
         let east = (i64::from(longitude) - i64::from(self.longitude) + TURN / 2).rem_euclid(TURN) - TURN / 2;
         [north as f32 * METRES, east as f32 * self.east()]
     }
 
-    /// Latitude and longitude of a place so far north and east of the origin, m.
+    /// Latitude and longitude, in ten-millionths of a degree, of a position north and east of the
+    /// origin, m.
     #[must_use]
     pub fn global(&self, [north, east]: [f32; 2]) -> (i32, i32) {
         let latitude = i64::from(self.latitude) + i64::from((north / METRES) as i32);
+        // The lower bound avoids a division by zero at a pole.
         let longitude = i64::from(self.longitude) + i64::from((east / self.east().max(METRES * 1e-3)) as i32);
         let longitude = (longitude + TURN / 2).rem_euclid(TURN) - TURN / 2;
         let narrow = |number: i64| i32::try_from(number).unwrap_or(if number < 0 { i32::MIN } else { i32::MAX });
         (narrow(latitude), narrow(longitude))
     }
 
-    /// How far below the origin this altitude above the sea is, m.
+    /// Position below the origin, m, from an altitude above mean sea level, m.
     #[must_use]
     pub fn down(&self, altitude: f32) -> f32 {
         self.altitude as f32 * 1e-3 - altitude

@@ -1,8 +1,9 @@
-//! Schemas: what the words of a message mean.
+//! Schemas: names, types and units of the words of a message.
 //!
-//! [`message!`](crate::message!) generates one [`FieldInfo`] for each field. A field may be a message itself, an option
-//! or an array of such, so a schema is a tree. Tools that work on words (a log, a console, a plot) ask for its
-//! [`leaves`]: scalars, and arrays of scalars, in word order, each with a flat name.
+//! [`message!`](crate::message!) generates one [`FieldInfo`] for each field. A field may itself be
+//! a message, or an option or an array of messages, so a schema is a tree. Tools that work on words
+//! (a log, a console, a plot) use its [`leaves`]: scalars and arrays of scalars, in word order,
+//! each with a flat name.
 //!
 //! | declaration | leaves |
 //! |---|---|
@@ -12,8 +13,9 @@
 //! | `wind: Wind`, a message with `speed` and `sigma` | `wind_speed`, `wind_sigma` |
 //! | `wheels: [Wheel; 2]`, a message with `rate` | `wheels_0_rate`, `wheels_1_rate` |
 //!
-//! Flat names are what logs and plots can hold: a ULog field name is letters, digits and underscores. Two fields whose
-//! flat names are the same (`wind_speed: f32` beside that `wind`) cannot be told apart in a log.
+//! Logs and plots need flat names: a ULog field name consists of letters, digits and underscores.
+//! Two fields with the same flat name (`wind_speed: f32` next to that `wind`) cannot be
+//! distinguished in a log.
 
 mod leaf;
 mod value;
@@ -21,31 +23,31 @@ mod value;
 pub use leaf::{Leaf, LeafName, Leaves, leaves};
 pub use value::Value;
 
-/// How one element of a field is stored.
+/// Storage of one element of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FieldKind {
-    /// IEEE 754 single.
+    /// IEEE 754 single precision, one word.
     F32,
-    /// IEEE 754 double in two words, low first.
+    /// IEEE 754 double precision in two words, low word first.
     F64,
-    /// Unsigned, one word.
+    /// Unsigned 32 bits, one word.
     U32,
-    /// Signed, one word.
+    /// Signed 32 bits, one word.
     I32,
     /// Unsigned 16 bits in one word.
     U16,
-    /// Signed 16 bits in one word.
+    /// Signed 16 bits in one word, sign-extended.
     I16,
     /// Unsigned 8 bits in one word.
     U8,
-    /// Signed 8 bits in one word.
+    /// Signed 8 bits in one word, sign-extended.
     I8,
     /// Truth value in one word, 0 or 1.
     Bool,
-    /// Unsigned 64 bits in two words, low first.
+    /// Unsigned 64 bits in two words, low word first.
     U64,
-    /// Signed 64 bits in two words, low first.
+    /// Signed 64 bits in two words, low word first.
     I64,
     /// One of a list of named values, in one word.
     Enum(&'static [(&'static str, u32)]),
@@ -53,11 +55,12 @@ pub enum FieldKind {
     Flags(&'static [(&'static str, u32)]),
     /// A message with this schema.
     Message(&'static [FieldInfo]),
-    /// A value that may be absent: one word, 0 or 1, then the words of the value, zero when it is absent.
+    /// A value that may be absent: one word, 0 or 1, then the words of the value, which are zero
+    /// when it is absent.
     Option {
-        /// How one element of the value is stored.
+        /// Storage of one element of the value.
         kind: &'static FieldKind,
-        /// How many elements the value has.
+        /// Number of elements of the value.
         count: usize,
     },
 }
@@ -69,6 +72,7 @@ impl FieldKind {
         match self {
             Self::F64 | Self::U64 | Self::I64 => 2,
             Self::Message(fields) => {
+                // A loop with an index, because iterators cannot be used in a `const fn`.
                 let (mut size, mut index) = (0, 0);
                 while index < fields.len() {
                     size += fields[index].words;
@@ -81,7 +85,8 @@ impl FieldKind {
         }
     }
 
-    /// The value in the words of one element; `None` when it is no scalar, or when words are missing.
+    /// The value of one element. `None` when the kind is a message or an option, or when words are
+    /// missing.
     #[must_use]
     pub fn value(self, words: &[u32]) -> Option<Value> {
         let word = *words.first()?;
@@ -100,7 +105,7 @@ impl FieldKind {
         })
     }
 
-    /// How many levels of messages and options it has.
+    /// Number of nested levels of messages and options.
     const fn depth(self) -> usize {
         match self {
             Self::Message(fields) => 1 + depth(fields),
@@ -110,12 +115,12 @@ impl FieldKind {
     }
 }
 
-/// One line of a message's schema.
+/// Schema of one field of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldInfo {
     /// The field's name.
     pub name: &'static str,
-    /// SI unit, empty where there is none.
+    /// SI unit, empty for dimensionless fields.
     pub unit: &'static str,
     /// Storage of one element.
     pub kind: FieldKind,
@@ -125,7 +130,7 @@ pub struct FieldInfo {
     pub words: usize,
 }
 
-/// Most levels of messages and options in each other, the outermost message included.
+/// Maximum number of nested levels of messages and options, the outermost message included.
 pub const MAX_DEPTH: usize = 6;
 
 const fn depth(fields: &[FieldInfo]) -> usize {
@@ -140,7 +145,8 @@ const fn depth(fields: &[FieldInfo]) -> usize {
     deepest
 }
 
-/// Refuses at compile time what [`message!`](crate::message!) cannot refuse by its syntax.
+/// Checks at compile time the rules that the syntax of [`message!`](crate::message!) cannot
+/// express.
 #[doc(hidden)]
 #[must_use]
 pub const fn checked(fields: &'static [FieldInfo]) -> &'static [FieldInfo] {

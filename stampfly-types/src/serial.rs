@@ -1,11 +1,15 @@
-//! Messages and their fields for [serde](https://serde.rs), behind the feature `serde`.
+//! [serde](https://serde.rs) support for messages and their fields, behind the feature `serde`.
 //!
-//! A message is serialised as its words, so whatever [`from_words`](crate::Message::from_words) refuses (an unknown variant, an unnamed bit,
-//! a quaternion that is none) is refused here, too. It is written by the macros that declare messages and asks nothing
-//! of the types of their fields, so another crate's messages compile with and without the feature, whether or not that
-//! crate knows serde. Not for a radio or between versions: there is no schema in it.
+//! A message is serialised as its words. Reading refuses the same words as
+//! [`from_words`](crate::Message::from_words): unknown variants, unnamed bits, quaternions whose
+//! length is not one. The macros that declare messages generate the code and require nothing of the
+//! fields' types, so messages of other crates compile with and without the feature, whether or not
+//! those crates depend on serde.
+//!
+//! Not for radio links, and not for data that other versions read: it contains no schema.
 
-/// Makes a message serialisable where this crate's feature `serde` is on. For [`message!`](crate::message!) only.
+/// Implements serde's traits for a message when the feature `serde` of this crate is on. For
+/// [`message!`](crate::message!) only.
 #[cfg(feature = "serde")]
 #[doc(hidden)]
 #[macro_export]
@@ -25,7 +29,8 @@ macro_rules! __serde_message {
     };
 }
 
-/// Makes an enumeration or a set of bits serialisable where this crate's feature `serde` is on.
+/// Implements serde's traits for an enumeration or a set of flags when the feature `serde` of this
+/// crate is on.
 #[cfg(feature = "serde")]
 #[doc(hidden)]
 #[macro_export]
@@ -71,14 +76,14 @@ mod with_serde {
     use serde::ser::SerializeTuple;
     pub use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    /// Writes a message as the tuple of its words.
+    /// Serialises a message as the tuple of its words.
     pub fn serialize_message<M: Message, S: Serializer>(message: &M, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(M::WORDS)?;
         message.to_words().as_ref().iter().try_for_each(|word| tuple.serialize_element(word))?;
         tuple.end()
     }
 
-    /// Reads a message; an error when a field refuses its words.
+    /// Deserialises a message. An error when the words of a field do not encode a value.
     pub fn deserialize_message<'de, M: Message, D: Deserializer<'de>>(deserializer: D) -> Result<M, D::Error> {
         deserializer.deserialize_tuple(M::WORDS, Words(PhantomData))
     }
@@ -101,7 +106,7 @@ mod with_serde {
         }
     }
 
-    /// Writes a field of one word as its number.
+    /// Serialises a field of one word as its number.
     pub fn serialize_word<F: Field, S: Serializer>(field: &F, serializer: S) -> Result<S::Ok, S::Error> {
         let mut word = [0];
         field.write(&mut word);
@@ -109,7 +114,7 @@ mod with_serde {
         serializer.serialize_u32(number)
     }
 
-    /// Reads a field of one word; an error when it refuses the number.
+    /// Deserialises a field of one word. An error when the number does not encode a value.
     pub fn deserialize_word<'de, F: Field, D: Deserializer<'de>>(deserializer: D) -> Result<F, D::Error> {
         let number = u32::deserialize(deserializer)?;
         F::read(&[number]).ok_or_else(|| D::Error::custom("an unknown number"))

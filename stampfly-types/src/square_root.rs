@@ -1,23 +1,26 @@
-//! Square root from multiplications, for cores without an instruction for it that a library can name.
+//! Square root by multiplications, for targets on which `libm` does not use a machine instruction.
 //!
-//! Its bits are those of `libm`: the root, rounded to the nearest. It takes 40 instructions instead of 50 on an ARM core, and 40
-//! instead of 280 on an Xtensa core, whose compiler makes a call of each wide product. Not for machines where `libm` itself uses the
-//! machine's instruction: x86, AArch64, WebAssembly.
+//! The result is bit-identical to `libm`'s: the root, rounded to the nearest. It takes 40
+//! instructions, compared with 50 on an ARM core and 280 on an Xtensa core, where the compiler
+//! makes a call of each wide product. Not for targets on which `libm` itself uses the machine's
+//! instruction: x86, AArch64, WebAssembly.
 
-/// Below this the inverse root's steps would meet subnormal numbers, above it the square of a root overflows: 2⁻¹⁰⁰ and 2¹²⁶.
+/// Range of the fast path: 2⁻¹⁰⁰ to 2¹²⁶. Below it Newton's steps would meet subnormal numbers,
+/// above it the square of a root would overflow.
 const SMALLEST: u32 = (127 - 100) << 23;
 const LARGEST: u32 = (127 + 126) << 23;
 
-/// First guess of an inverse root, to 3.5 %: half of the number's logarithm, with the constant of C. Lomont, "Fast Inverse Square
-/// Root", 2003, that is best before two steps of Newton's.
+/// First guess of an inverse root, accurate to 3.5 %: it halves the number's logarithm. The
+/// constant is the one of C. Lomont, "Fast Inverse Square Root", 2003, that is optimal before two
+/// steps of Newton's method.
 const GUESS: u32 = 0x5f37_5a86;
 
-/// Bits of a number's fraction, and the one that is not written down.
+/// The stored bits of a number's fraction, and its implicit leading bit.
 const FRACTION: u32 = (1 << 23) - 1;
 const HIDDEN: u32 = 1 << 23;
 
 /// Square root, rounded to the nearest. NaN for negative numbers.
-// Forty instructions that are wanted in many places, some of them in fast memory.
+// Forty instructions that are called from many places, some of them in fast memory.
 #[inline(never)]
 #[must_use]
 pub fn sqrt(value: f32) -> f32 {
@@ -30,13 +33,17 @@ pub fn sqrt(value: f32) -> f32 {
     inverse *= 1.5 - half * inverse * inverse;
     inverse *= 1.5 - half * inverse * inverse;
     let root = value * inverse;
-    // What is wrong by 5e-6 is wrong by 1e-11 and the rounding after this: less than one and a half units in the last place.
+    // The inverse is accurate to 5e-6 here, and this step squares that: 1e-11 plus its own
+    // rounding, which is less than one and a half units in the last place.
     let near = (root + 0.5 * inverse * (value - root * root)).to_bits();
-    // Is the root nearer to a neighbour? Value and root as integers, in units of the root's last place and their square. Their
-    // difference is small, so the low half of each says it.
+    // Checks whether a neighbour is nearer to the root. Value and squared root are integers in
+    // units of the squared last place; their difference is small, so the low 32 bits of both
+    // suffice.
     let integer = near & FRACTION | HIDDEN;
     let shift = 150 + (bits >> 23) - 2 * (near >> 23);
     let excess = (bits << shift).wrapping_sub(integer.wrapping_mul(integer)) as i32;
+    // A neighbour is nearer when the remainder exceeds half the distance to its square:
+    // (n ± ½)² ≈ n² ± n.
     let most = integer as i32;
     f32::from_bits(near + u32::from(excess > most) - u32::from(excess <= -most))
 }
@@ -48,7 +55,8 @@ mod tests {
 
     #[test]
     fn every_fraction_has_the_root_of_the_machine() {
-        // Four times a number has twice its root, with the same fraction: these are all there are.
+        // Four times a number has twice its root with the same fraction, so this range covers all
+        // cases.
         for bits in 1f32.to_bits()..4f32.to_bits() {
             let value = f32::from_bits(bits);
             assert_eq!(sqrt(value).to_bits(), libm::sqrtf(value).to_bits(), "{value}");

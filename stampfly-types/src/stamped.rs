@@ -1,4 +1,4 @@
-//! A message with the instant it is valid for, as readers of the bus and estimators get it.
+//! [`Stamped`]: a message with the instant it is valid for, as returned by readers of the bus.
 
 use crate::{Duration, Instant};
 
@@ -22,7 +22,7 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// How old the data is at `now`; zero when it is stamped in the future.
+    /// Age of the data at `now`; zero when its stamp is in the future.
     #[inline]
     #[must_use]
     pub fn age(&self, now: Instant) -> Duration {

@@ -1,8 +1,9 @@
-//! A message as text, field by field: for CSV, JSON lines and consoles.
+//! Messages as text, field by field: for CSV, JSON lines and consoles.
 //!
-//! Numbers are written with the fewest digits that read back as the same bits (`core::fmt` does that for `f32`), so text
-//! loses nothing. Fields with one element only, and no vectors or quaternions: text is for flat records. For a log of
-//! everything use ULog, for a radio a codec of bytes.
+//! Numbers are written with the fewest digits that read back as the same bits (`core::fmt` does
+//! this for `f32`), so the text is lossless. For flat records only: fields with several elements,
+//! vectors and quaternions included, are refused, as are `f64` and `i64`. For a log of all topics
+//! use ULog; for a radio use a codec of bytes.
 //!
 //! ```
 //! use stampfly_types::{Message, message, text};
@@ -33,7 +34,7 @@
 use crate::{FieldInfo, FieldKind, Message};
 use core::fmt::{Error, Result as Written, Write};
 
-/// How enumerations and truth values are written. Both are read.
+/// Format of enumerations and truth values for writing. Reading accepts both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// As numbers.
@@ -52,7 +53,8 @@ pub fn fields<M: Message>(words: &M::Words) -> impl Iterator<Item = (&'static Fi
     })
 }
 
-/// Are all floating-point numbers of the message finite?
+/// Whether all `f32` fields of the message are finite. Does not check `f64` fields or nested
+/// messages.
 pub fn is_finite<M: Message>(message: &M) -> bool {
     let finite = |words: &[u32]| words.iter().all(|word| f32::from_bits(*word).is_finite());
     fields::<M>(&message.to_words()).all(|(field, words)| field.kind != FieldKind::F32 || finite(words))
@@ -61,7 +63,8 @@ pub fn is_finite<M: Message>(message: &M) -> bool {
 /// Writes one field.
 ///
 /// # Errors
-/// When `out` refuses, the field has several elements, or its words are no value of it.
+/// When `out` fails, when the field has several elements or an unsupported type, or when its words
+/// are not the number of a named value.
 pub fn write(field: &FieldInfo, words: &[u32], style: Style, out: &mut impl Write) -> Written {
     let named = style == Style::Names;
     match (field.kind, words) {
@@ -78,7 +81,8 @@ pub fn write(field: &FieldInfo, words: &[u32], style: Style, out: &mut impl Writ
     }
 }
 
-/// Makes a message from the text of each of its fields. `None` when one is no value of its field.
+/// Parses a message from the text of each of its fields. `None` when a text is not a value of its
+/// field.
 ///
 /// # Errors
 /// Those of `text_of`.

@@ -1,17 +1,18 @@
-//! Time as an argument: instants and durations.
+//! Instants and durations.
 //!
-//! Nothing below the firmware package reads a clock: every step is told what time it is, as an [`Instant`]. What lies
-//! between two instants is a [`Duration`]: a period, a deadline, a budget, the age of a sample. They are two types
-//! because mixing them up compiles when both are a number, and then a stamp is compared with a timeout.
+//! Only the firmware package reads a clock: every step gets the time as an argument, an
+//! [`Instant`]. The difference of two instants is a [`Duration`]: a period, a deadline, a budget,
+//! the age of a sample. They are two types, because a stamp compared with a timeout compiles when
+//! both are numbers.
 //!
 //! | | `+ Instant` | `+ Duration` | `- Instant` | `- Duration` |
 //! |---|---|---|---|---|
 //! | [`Instant`] | does not compile | [`Instant`] | [`Instant::since`] | [`Instant`] |
 //! | [`Duration`] | does not compile | [`Duration`] | does not compile | [`Duration`] |
 //!
-//! Both count microseconds in 64 bits, which last 584,000 years; 32 bits, as other firmware uses, wrap after 71.6
-//! minutes, in flight. All arithmetic saturates: no operator panics, and none wraps. `core::time::Duration` is not used
-//! because it is 96 bits of seconds and nanoseconds, whose arithmetic panics on overflow.
+//! Both count microseconds in 64 bits, which last 584,000 years. The 32 bits of other firmware wrap
+//! after 71.6 minutes, in flight. All arithmetic saturates: no operator panics or wraps. The type
+//! is not `core::time::Duration`, whose 96 bits of seconds and nanoseconds panic on overflow.
 
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Sub};
@@ -19,10 +20,10 @@ use core::ops::{Add, AddAssign, Div, Mul, Sub};
 const MICROS_PER_MILLI: u64 = 1_000;
 const MICROS_PER_SECOND: u64 = 1_000_000;
 
-/// A point in time: microseconds since power-on.
+/// A point in time, counted in microseconds since power-on.
 ///
-/// Counted as the [`Duration`] since power-on. The difference of two instants is only offered as [`Instant::since`], which
-/// saturates: a stamp that lies in the future is zero old instead of 584,000 years.
+/// Instants have no `-` operator for each other. [`Instant::since`] returns the difference and
+/// saturates: the age of a stamp in the future is zero instead of 584,000 years.
 ///
 /// ```
 /// use stampfly_types::{Duration, Instant};
@@ -34,7 +35,7 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 /// assert_eq!(now.to_string(), "0.102500 s");
 /// ```
 ///
-/// Two instants do not add up, and an instant is no duration:
+/// Two instants cannot be added or subtracted, and an instant is not a duration:
 ///
 /// ```compile_fail,E0277
 /// use stampfly_types::Instant;
@@ -54,7 +55,7 @@ const MICROS_PER_SECOND: u64 = 1_000_000;
 pub struct Instant(Duration);
 
 impl fmt::Debug for Instant {
-    /// As the duration's, under its own name: `Instant(2500)`.
+    /// Like a duration, under its own name: `Instant(2500)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Instant").field(&self.as_micros()).finish()
     }
@@ -63,22 +64,22 @@ impl fmt::Debug for Instant {
 impl Instant {
     /// Power-on.
     pub const ZERO: Self = Self(Duration::ZERO);
-    /// The last instant that can be told, 584,000 years after power-on: "never" for a deadline.
+    /// The latest instant, 584,000 years after power-on: "never" for a deadline.
     pub const MAX: Self = Self(Duration::MAX);
 
-    /// The instant so many microseconds after power-on.
+    /// The instant `micros` microseconds after power-on.
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
         Self(Duration::from_micros(micros))
     }
 
-    /// The instant so many milliseconds after power-on.
+    /// The instant `millis` milliseconds after power-on.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self(Duration::from_millis(millis))
     }
 
-    /// The instant so many seconds after power-on.
+    /// The instant `secs` seconds after power-on.
     #[must_use]
     pub const fn from_secs(secs: u64) -> Self {
         Self(Duration::from_secs(secs))
@@ -90,19 +91,19 @@ impl Instant {
         self.0.as_micros()
     }
 
-    /// The time from `earlier` to `self`; zero when `earlier` lies in the future.
+    /// The time from `earlier` to `self`; zero when `earlier` is later than `self`.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         self.0.less(earlier.0)
     }
 
-    /// The signed difference `self − other` in seconds.
+    /// The difference `self − other` in seconds, with its sign.
     #[must_use]
     pub fn signed_seconds_since(self, other: Self) -> f32 {
         if self >= other { self.since(other).seconds() } else { -other.since(self).seconds() }
     }
 
-    /// Seconds since power-on with microsecond resolution, for display and logs.
+    /// Seconds since power-on as `f64`, for display and logs.
     #[must_use]
     pub fn seconds_f64(self) -> f64 {
         self.0.seconds_f64()
@@ -122,7 +123,7 @@ impl Instant {
 /// assert_eq!(period.to_string(), "0.002500 s");
 /// ```
 ///
-/// A duration added to an instant is an instant, but nothing is added to a duration except durations:
+/// An instant plus a duration is an instant. Only durations can be added to a duration:
 ///
 /// ```compile_fail,E0308
 /// use stampfly_types::{Duration, Instant};
@@ -134,33 +135,33 @@ impl Instant {
 pub struct Duration(u64);
 
 impl Duration {
-    /// No time at all.
+    /// No time.
     pub const ZERO: Self = Self(0);
     /// The longest duration, 584,000 years.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// A number of microseconds.
+    /// A duration of `micros` microseconds.
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 
-    /// A number of milliseconds.
+    /// A duration of `millis` milliseconds.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self(millis.saturating_mul(MICROS_PER_MILLI))
     }
 
-    /// A number of seconds.
+    /// A duration of `secs` seconds.
     #[must_use]
     pub const fn from_secs(secs: u64) -> Self {
         Self(secs.saturating_mul(MICROS_PER_SECOND))
     }
 
-    /// A number of seconds, rounded to the microsecond. Negative and NaN give zero.
+    /// A duration in seconds, rounded to the microsecond. Zero for negative numbers and NaN.
     #[must_use]
     pub fn from_seconds(seconds: f32) -> Self {
-        // `as` saturates and maps NaN to zero, which is exactly what is promised.
+        // The cast saturates and maps NaN to zero.
         Self((f64::from(seconds) * 1e6 + 0.5) as u64)
     }
 
@@ -176,22 +177,22 @@ impl Duration {
         self.0 / MICROS_PER_MILLI
     }
 
-    /// The duration in seconds. Exact to one part in 2²⁴.
+    /// The duration in seconds, accurate to one part in 2²⁴.
     #[must_use]
     pub fn seconds(self) -> f32 {
-        // In halves, which FPUs convert: 64 bits at once are a call of 40 instructions where 32 are a register. The same
-        // number as of the whole in the first 71 minutes.
+        // Converts two halves: FPUs convert 32 bits in one instruction, while 64 bits are a call of
+        // 40 instructions. During the first 71 minutes the result equals that of the whole number.
         let [low, high] = [self.0 as u32, (self.0 >> 32) as u32];
         (high as f32 * 4_294_967_296.0 + low as f32) * 1e-6
     }
 
-    /// The duration in seconds with microsecond resolution, for display and logs.
+    /// The duration in seconds as `f64`, for display and logs.
     #[must_use]
     pub fn seconds_f64(self) -> f64 {
         self.0 as f64 * 1e-6
     }
 
-    /// What is left of it after `other`. Operators cannot be constant.
+    /// The saturating difference. Operators cannot be `const`.
     const fn less(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }
@@ -246,7 +247,7 @@ impl Mul<u64> for Duration {
     }
 }
 
-/// Rounds down. Division by zero saturates at [`Duration::MAX`].
+/// Rounds down. Division by zero returns [`Duration::MAX`].
 impl Div<u64> for Duration {
     type Output = Self;
     fn div(self, divisor: u64) -> Self {

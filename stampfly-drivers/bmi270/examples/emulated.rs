@@ -1,14 +1,15 @@
-//! A BMI270 emulated down to its registers, on this PC: a vehicle that stands still, at 400 samples a second.
+//! Runs the driver on a register-level emulation of a BMI270 on this PC: a vehicle at rest, 400
+//! samples a second.
 //!
-//! `cargo run -p stampfly-bmi270 --example emulated-bmi270`, in the repository. Bosch's configuration file is not part of it; the emulated chip
-//! takes a stand-in.
+//! `cargo run -p stampfly-bmi270 --example emulated-bmi270`, in the repository, which does not
+//! contain Bosch's configuration file; the emulated chip accepts a substitute.
 
 use stampfly_bmi270::{Axis, AxisMap, Bmi270, Config, Imu};
 use stampfly_sim::chips::{self, SpiBus, stand_in_image};
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
 
-/// It is soldered upside down: body = (y, x, −z) of the chip.
+/// The chip is mounted upside down: body = (y, x, −z) of the chip.
 const AXES: AxisMap = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 
 fn main() {

@@ -1,8 +1,11 @@
-//! A BMI270 on an ESP32-C6, without an executor: SCK at GPIO18, SDI at GPIO19, SDO at GPIO20, chip select at GPIO21. Shows acceleration and angular rate
-//! on the serial port.
+//! A BMI270 on an ESP32-C6 without an executor. Prints acceleration and angular rate on the serial
+//! port.
 //!
-//! `stampfly-drivers/boards/esp32` has the versions of the crates and the linker's settings: `cargo run --release --example bmi270` there. On
-//! another ESP32 only the pins' names change.
+//! Wiring: SCK GPIO18, SDI GPIO19, SDO GPIO20, chip select GPIO21.
+//!
+//! Build it in `stampfly-drivers/boards/esp32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example bmi270`. On another ESP32 only the names of the
+//! pins differ.
 
 #![no_std]
 #![no_main]

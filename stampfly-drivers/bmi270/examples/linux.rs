@@ -1,7 +1,9 @@
-//! A BMI270 on a computer with Linux, such as a Raspberry Pi: on I2C at `/dev/i2c-1`, or with the argument `spi` on SPI at `/dev/spidev0.0`. Shows
-//! acceleration and angular rate.
+//! A BMI270 on a computer with Linux, such as a Raspberry Pi. Prints acceleration and angular rate.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example bmi270` there, or `cargo run --example bmi270 spi`.
+//! Wiring: I2C at `/dev/i2c-1`, or SPI at `/dev/spidev0.0` with the argument `spi`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example bmi270` or `cargo run --example bmi270 spi`.
 
 use bmi2::config::BMI270_CONFIG_FILE;
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
@@ -23,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Whichever wires it hangs on.
+/// Prints samples of an IMU on either bus.
 fn show<E: Error + 'static>(mut imu: impl Imu<Error = E>) -> Result<(), Box<dyn Error>> {
     loop {
         let sample = block_on(imu.next())?;

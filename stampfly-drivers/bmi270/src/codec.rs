@@ -1,5 +1,5 @@
-//! Registers, scales and frames of the BMI270, from Bosch BST-BMI270-DS000 revision 1.3. Registers are described in its
-//! §5.2 in the order of their addresses, which are given here; other sections are named by their titles.
+//! Registers, scales and frames of the BMI270, from Bosch BST-BMI270-DS000 revision 1.3. Register
+//! addresses refer to its §5.2; other sections are cited by title.
 
 use super::config::Config;
 pub use super::config::{AccelRange, GyroRange, Rate};
@@ -8,49 +8,51 @@ pub use super::config::{AccelRange, GyroRange, Rate};
 pub mod register {
     /// Identification: [`CHIP_ID_VALUE`](super::CHIP_ID_VALUE).
     pub const CHIP_ID: u8 = 0x00;
-    /// Accelerometer, 6 bytes, then gyroscope, 6 bytes.
+    /// Accelerometer data, 6 bytes, followed by gyroscope data, 6 bytes.
     pub const DATA_8: u8 = 0x0C;
-    /// Sensor time, 3 bytes; the [`Status`](super::Status) burst begins here.
+    /// Sensor time, 3 bytes; first register of the [`Status`](super::Status) burst.
     pub const SENSORTIME_0: u8 = 0x18;
     /// Start-up status.
     pub const INTERNAL_STATUS: u8 = 0x21;
-    /// Which page of features the registers from 0x30 on show.
+    /// Selects the page of features at the registers from 0x30.
     pub const FEAT_PAGE: u8 = 0x2F;
-    /// On page 1: longest burst, then what [`GYRO_TRIGGER`](super::GYRO_TRIGGER) starts, a byte each.
+    /// On page 1: longest burst, then the operation that [`GYRO_TRIGGER`](super::GYRO_TRIGGER)
+    /// starts; one byte each.
     pub const G_TRIG_1: u8 = 0x32;
-    /// On page 0: why the command was not carried out.
+    /// On page 0: the reason why the triggered operation was refused.
     pub const GYR_GAIN_STATUS: u8 = 0x38;
     /// FIFO output.
     pub const FIFO_DATA: u8 = 0x26;
     /// Gyroscope cross-axis factor.
     pub const GYR_CAS: u8 = 0x3C;
-    /// Accelerometer configuration; its range, the gyroscope's configuration and range follow.
+    /// Accelerometer configuration, followed by its range and the gyroscope's configuration and
+    /// range.
     pub const ACC_CONF: u8 = 0x40;
     /// FIFO down-sampling.
     pub const FIFO_DOWNS: u8 = 0x45;
-    /// Fill level of the FIFO that raises the interrupt, bytes, 2 bytes.
+    /// FIFO fill level that raises the interrupt, bytes, 2 bytes.
     pub const FIFO_WTM_0: u8 = 0x46;
     /// FIFO configuration, 2 bytes.
     pub const FIFO_CONFIG_0: u8 = 0x48;
-    /// Electrical behaviour of the pin INT1.
+    /// Electrical configuration of the pin INT1.
     pub const INT1_IO_CTRL: u8 = 0x53;
-    /// Whether interrupts stay until they are read.
+    /// Whether interrupts are latched until they are read.
     pub const INT_LATCH: u8 = 0x55;
-    /// Which data interrupts go to which pin.
+    /// Assignment of data interrupts to pins.
     pub const INT_MAP_DATA: u8 = 0x58;
     /// Start of initialisation.
     pub const INIT_CTRL: u8 = 0x59;
-    /// Address of the configuration data in words, 2 bytes.
+    /// Address of the configuration data in words of two bytes, 2 bytes.
     pub const INIT_ADDR_0: u8 = 0x5B;
     /// Configuration data.
     pub const INIT_DATA: u8 = 0x5E;
-    /// A test of the gyroscope runs: [`GYRO_TEST_RUNS`](super::GYRO_TEST_RUNS).
+    /// Gyroscope self test in progress: [`GYRO_TEST_RUNS`](super::GYRO_TEST_RUNS).
     pub const GYR_CRT_CONF: u8 = 0x69;
     /// Accelerometer self test.
     pub const ACC_SELF_TEST: u8 = 0x6D;
-    /// Outcome of the gyroscope's self test.
+    /// Result of the gyroscope's self test.
     pub const GYR_SELF_TEST_AXES: u8 = 0x6E;
-    /// Power saving.
+    /// Power saving mode.
     pub const PWR_CONF: u8 = 0x7C;
     /// Sensor enables.
     pub const PWR_CTRL: u8 = 0x7D;
@@ -58,7 +60,7 @@ pub mod register {
     pub const CMD: u8 = 0x7E;
 }
 
-/// What [`register::CHIP_ID`] reads, register 0x00.
+/// Value of [`register::CHIP_ID`], register 0x00.
 pub const CHIP_ID_VALUE: u8 = 0x24;
 /// Command: reset, register 0x7E.
 pub const SOFT_RESET: u8 = 0xB6;
@@ -66,21 +68,21 @@ pub const SOFT_RESET: u8 = 0xB6;
 pub const FIFO_FLUSH: u8 = 0xB0;
 /// Temperature, accelerometer and gyroscope on, register 0x7D.
 pub const ALL_SENSORS: u8 = 0x0E;
-/// Four frames, register 0x46.
+/// Watermark of four frames, register 0x46.
 pub const WATERMARK: [u8; 2] = [4 * FRAME_BYTES as u8, 0];
 /// Push-pull, active high, output enabled, register 0x53.
 pub const INT1_PUSH_PULL_HIGH: u8 = 0x0A;
-/// The pin follows the fill level, register 0x55.
+/// The pin follows the fill level without latching, register 0x55.
 pub const NOT_LATCHED: u8 = 0x00;
 /// The FIFO's watermark on INT1, register 0x58.
 pub const WATERMARK_ON_INT1: u8 = 0x02;
-/// Command: what [`register::G_TRIG_1`] selects, register 0x7E.
+/// Command: start the operation selected in [`register::G_TRIG_1`], register 0x7E.
 pub const GYRO_TRIGGER: u8 = 0x02;
-/// The self test and not the calibration of the sensitivity (bit 0 of the second byte), not to be given up (its bit 1),
-/// data in no bursts as after a reset (the first byte): registers 0x32 and 0x33 of page 1. The features are written in
-/// words of two bytes.
+/// Selects the self test instead of the sensitivity calibration (bit 0 of the second byte), without
+/// abort (its bit 1), with the burst length of a reset (the first byte): registers 0x32 and 0x33 of
+/// page 1. Features are written in words of two bytes.
 pub const SELECT_GYRO_SELF_TEST: [u8; 2] = [0x00, 0x00];
-/// Set before the command, cleared by the chip when the test is over, register 0x69.
+/// Set before the command, and cleared by the chip at the end of the test, register 0x69.
 pub const GYRO_TEST_RUNS: u8 = 0x04;
 /// Accelerometer only, register 0x7D.
 pub const ACCELEROMETER_ONLY: u8 = 0x04;
@@ -88,19 +90,20 @@ pub const ACCELEROMETER_ONLY: u8 = 0x04;
 pub const NORMAL_POWER: u8 = 0x02;
 /// Filtered data into the FIFO, not down-sampled, register 0x45.
 pub const FIFO_FILTERED: u8 = 0x88;
-/// Overwrite the oldest, no sensor time frame; headers, accelerometer and gyroscope, register 0x48 and register 0x49.
+/// Overwrite the oldest frame, no sensor time frame; headers, accelerometer and gyroscope,
+/// registers 0x48 and 0x49.
 pub const FIFO_WITH_HEADERS: [u8; 2] = [0x00, 0xD0];
 /// Header of a frame with both sensors, §4 "FIFO".
 const BOTH_SENSORS: u8 = 0x8C;
 /// Bytes of a frame with both sensors: header, gyroscope, accelerometer, §4 "FIFO".
 pub const FRAME_BYTES: usize = 13;
-/// The longest configuration the chip holds, bytes, §4 "Device initialization".
+/// Maximum length of the configuration, bytes, §4 "Device initialization".
 pub const BLOB_LIMIT: usize = 8192;
-/// A sensor time tick is 39.0625 µs, register 0x18: this many of them are 5 ms.
+/// Ticks of the sensor time in 5 ms; one tick is 39.0625 µs, register 0x18.
 pub const TICKS_IN_5_MILLIS: u64 = 128;
 
 impl AccelRange {
-    /// The register's value.
+    /// The value of the register.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -124,7 +127,7 @@ impl AccelRange {
 }
 
 impl GyroRange {
-    /// The register's value.
+    /// The value of the register.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -150,7 +153,8 @@ impl GyroRange {
 }
 
 impl Rate {
-    /// The chip's output data rate of four times this, for either sensor, register 0x40 and register 0x42.
+    /// Code of the chip's output data rate, four times this rate, for both sensors; registers 0x40
+    /// and 0x42.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -160,7 +164,7 @@ impl Rate {
         }
     }
 
-    /// Sensor time ticks between two samples of the chip.
+    /// Ticks of the sensor time between two samples of the chip.
     #[must_use]
     pub const fn ticks(self) -> u64 {
         match self {
@@ -171,7 +175,7 @@ impl Rate {
     }
 }
 
-/// ACC_CONF, ACC_RANGE, GYR_CONF and GYR_RANGE: performance filters of normal bandwidth,
+/// ACC_CONF, ACC_RANGE, GYR_CONF and GYR_RANGE, with performance filters of normal bandwidth;
 /// registers 0x40 to 0x43.
 #[must_use]
 pub const fn sensor_registers(config: &Config) -> [u8; 4] {
@@ -179,43 +183,47 @@ pub const fn sensor_registers(config: &Config) -> [u8; 4] {
     [0xA0 | rate, config.accel_range.code(), 0xE0 | rate, config.gyro_range.code()]
 }
 
-/// Where configuration byte `offset` goes: the word address, low four bits first, register 0x5B and register 0x5C.
+/// Address of configuration byte `offset`: the word address, low four bits first; registers 0x5B
+/// and 0x5C.
 #[must_use]
 pub const fn init_address(offset: usize) -> [u8; 2] {
     let word = offset / 2;
     [(word & 0x0F) as u8, (word >> 4) as u8]
 }
 
-/// The gyroscope's cross-axis factor: seven bits, signed, register 0x3C.
+/// The gyroscope's cross-axis factor: a signed number of seven bits, register 0x3C.
 #[must_use]
 pub const fn cross_axis_factor(register: u8) -> i8 {
     ((register << 1) as i8) >> 1
 }
 
-/// What the chip says about itself: registers 0x18 to 0x25 in one burst.
+/// Status of the chip: registers 0x18 to 0x25, read in one burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// Free-running time in ticks of 39.0625 µs, 24 bits, register 0x18. Samples are taken
-    /// where it divides by their period.
+    /// Free-running time in ticks of 39.0625 µs, 24 bits, register 0x18. The chip samples when it
+    /// is a multiple of the sample period.
     pub sensor_time: u32,
-    /// The accelerometer's or gyroscope's configuration is impossible, register 0x1B.
+    /// The configuration of the accelerometer or gyroscope is invalid, register 0x1B.
     pub configuration_error: bool,
-    /// The low four bits of INTERNAL_STATUS: 1 is running, 0 is not initialised, 2 is a refused
-    /// configuration, register 0x21.
+    /// Low four bits of INTERNAL_STATUS, register 0x21: 0 not initialised, 1 running, 2
+    /// configuration refused.
     pub start_up: u8,
-    /// Die temperature in 1/512 K from 23 °C; `None` while there is none, register 0x22.
+    /// Die temperature in 1/512 K relative to 23 °C, register 0x22; `None` before the first
+    /// measurement.
     pub temperature: Option<i16>,
-    /// Bytes in the FIFO, register 0x24.
+    /// Fill level of the FIFO, bytes, register 0x24.
     pub fifo_bytes: u16,
 }
 
 impl Status {
-    /// The value of [`start_up`](Self::start_up) of a chip that runs.
+    /// Value of [`start_up`](Self::start_up) of a running chip.
     pub const RUNNING: u8 = 1;
 
-    /// Takes the burst apart.
+    /// Decodes the burst.
     #[must_use]
     pub const fn decode(burst: &[u8; 14]) -> Self {
+        // The burst covers registers that are not used, because one transfer is cheaper than
+        // several.
         let [time0, time1, time2, event, _, _, _, _, _, internal, temp0, temp1, fifo0, fifo1] = *burst;
         let temperature = i16::from_le_bytes([temp0, temp1]);
         Self {
@@ -227,7 +235,8 @@ impl Status {
         }
     }
 
-    /// Is there nothing in the FIFO but frames of both sensors? No single wrong bit makes one such fill level of another.
+    /// Whether the fill level is a whole number of frames of both sensors. No single wrong bit
+    /// changes one such fill level to another.
     #[must_use]
     pub const fn holds_whole_frames(&self) -> bool {
         (self.fifo_bytes as usize).is_multiple_of(FRAME_BYTES)
@@ -240,13 +249,14 @@ impl Status {
     }
 }
 
-/// Four frames of both sensors as accelerometer x, y, z, gyroscope x, y, z in counts.
+/// Decodes four frames of both sensors into accelerometer x, y, z and gyroscope x, y, z, in counts.
 ///
-/// `None` when there is anything else among them: a skip frame (samples were lost), a frame of one sensor (the other is
-/// starting up), a configuration change, the end of data. §4 "FIFO".
+/// `None` if there is any other frame among them: a skip frame (samples were lost), a frame of one
+/// sensor (the other is starting up), a configuration change, the end of the data. §4 "FIFO".
 ///
-/// Every other frame is shorter than these, and what follows it is not in its place. So when the FIFO held whole frames
-/// only ([`Status::holds_whole_frames`]) and three headers are right, one wrong bit in the fourth is the bus's error.
+/// All other frames are shorter than these, so the bytes after one are out of place. When the FIFO
+/// held only whole frames ([`Status::holds_whole_frames`]) and three headers are correct, a single
+/// wrong bit in the fourth is therefore a transmission error and is accepted.
 #[must_use]
 pub fn decode_frames(bytes: &[u8; 4 * FRAME_BYTES], whole: bool) -> Option<[[i16; 6]; 4]> {
     let mut group = [[0; 6]; 4];
@@ -254,7 +264,7 @@ pub fn decode_frames(bytes: &[u8; 4 * FRAME_BYTES], whole: bool) -> Option<[[i16
     let (frames, _) = bytes.as_chunks::<FRAME_BYTES>();
     for (sample, frame) in group.iter_mut().zip(frames) {
         let (header, values) = decode_frame(frame)?;
-        // Bits 1:0 are the tags of the interrupt pins, which are not used.
+        // Bits 1:0 are tags of the interrupt pins, which are not used.
         wrong_bits += ((header ^ BOTH_SENSORS) & 0xFC).count_ones();
         *sample = values;
     }
@@ -266,20 +276,20 @@ fn decode_frame(frame: &[u8; FRAME_BYTES]) -> Option<(u8, [i16; 6])> {
     let gyro = [[gx0, gx1], [gy0, gy1], [gz0, gz1]].map(i16::from_le_bytes);
     let [ax, ay, az] = [[ax0, ax1], [ay0, ay1], [az0, az1]].map(i16::from_le_bytes);
     let [gx, gy, gz] = gyro;
-    // The code of a gyroscope without data, register 0x12; not a reading, which saturates on one axis before all three.
+    // The code of a gyroscope without data, register 0x12. A saturated measurement does not have it
+    // on all three axes.
     (gyro != [i16::MIN; 3]).then_some((header, [ax, ay, az, gx, gy, gz]))
 }
 
-/// Accelerometer x, y, z in counts, of the data registers.
+/// Accelerometer x, y, z in counts, from the data registers.
 #[must_use]
 pub fn decode_acceleration(bytes: &[u8; 6]) -> [i16; 3] {
     let [x0, x1, y0, y1, z0, z1] = *bytes;
     [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes)
 }
 
-/// Does the difference between the two deflections, at ±16 g, pass the self test?
-///
-/// More than 16 g on x, less than −15 g on y, more than 10 g on z, §4 "Sensor self-test".
+/// Whether the difference between the two deflections, at ±16 g, passes the self test: more than 16
+/// g on x, less than −15 g on y, more than 10 g on z, §4 "Sensor self-test".
 #[must_use]
 pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
     let [x, y, z] = core::array::from_fn(|axis| {
@@ -289,15 +299,15 @@ pub fn passes_self_test(positive: [i16; 3], negative: [i16; 3]) -> bool {
     x > 16.0 && y < -15.0 && z > 10.0
 }
 
-/// The outcome of the gyroscope's self test, register 0x6E: bit 0 is "done", bits 1 to 3 are the axes that passed.
-///
-/// `None` while it runs.
+/// Result of the gyroscope's self test, register 0x6E: bit 0 is "done", bits 1 to 3 are the axes
+/// that passed. `None` while the test runs.
 #[must_use]
 pub const fn gyro_self_test(axes: u8) -> Option<bool> {
     if axes & 1 == 0 { None } else { Some(axes & 0x0E == 0x0E) }
 }
 
-/// Was the command of the gyroscope's test refused, given up or not prepared for, register 0x38 of page 0?
+/// Whether the trigger of the gyroscope's test was refused, aborted or not prepared, register 0x38
+/// of page 0.
 #[must_use]
 pub const fn gyro_trigger_failed(status: u8) -> bool {
     status & 0x38 != 0
@@ -316,7 +326,8 @@ mod tests {
 
     #[test]
     fn the_default_configuration_is_what_the_registers_say() {
-        // ODR 1600 Hz, normal bandwidth, performance filter; ±8 g; the same and low noise; ±2000 °/s.
+        // ODR 1600 Hz, normal bandwidth, performance filter; ±8 g; the same with low noise; ±2000
+        // °/s.
         assert_eq!(sensor_registers(&Config::default()), [0xAC, 0x02, 0xEC, 0x00]);
     }
 

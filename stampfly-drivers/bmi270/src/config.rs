@@ -1,6 +1,7 @@
-//! What a BMI270 is told: full scales and rate. How the registers say it is in [`codec`](super::codec).
+//! Configuration of a BMI270: full scales and rate. The register codes are in
+//! [`codec`](super::codec).
 
-/// What the chip is told to do.
+/// Configuration of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
@@ -8,7 +9,7 @@ pub struct Config {
     pub accel_range: AccelRange,
     /// Full scale of the gyroscope.
     pub gyro_range: GyroRange,
-    /// Samples per second as delivered.
+    /// Rate of the samples returned by the driver.
     pub rate: Rate,
 }
 
@@ -42,7 +43,7 @@ pub enum GyroRange {
     Dps2000,
 }
 
-/// Samples per second as delivered. The chip samples four times as often.
+/// Rate of the samples returned by the driver. The chip samples at four times this rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]

@@ -1,7 +1,7 @@
-//! The chip's interrupt pin, if there is one and as long as it can be trusted.
+//! The interrupt pin, which is optional.
 //!
-//! A pin that is silent, stuck high or wired elsewhere costs a little latency a few times and is ignored from then on:
-//! the driver knows without it when samples are due.
+//! A pin that stays silent, is stuck high or is connected elsewhere delays a few samples and is
+//! ignored afterwards: the driver computes without it when samples are due.
 
 use core::convert::Infallible;
 use embedded_hal::digital::ErrorType;
@@ -10,18 +10,19 @@ use stampfly_driver_core::Timebase;
 use stampfly_driver_core::chip::Port;
 use stampfly_types::{Duration, Instant};
 
-/// How long after the time that samples are due the pin may still rise: half a period of the chip at 1600 Hz. The
-/// chip's clock is off by some per cent, so the pin is usually the better one.
+/// Time after the samples are due during which the pin may still rise: half a sample period of the
+/// chip at 1600 Hz. The chip's clock is off by some per cent, so the pin is usually more accurate
+/// than the computed time.
 const LATE: Duration = Duration::from_micros(312);
-/// How often in a row the pin may be wrong.
+/// Number of consecutive errors after which the pin is ignored.
 const PATIENCE: u8 = 4;
 
-/// A pin, and how often in a row it was wrong.
+/// The pin, and its number of consecutive errors.
 #[derive(Debug)]
 pub(super) struct Interrupt<P> {
     pin: Option<P>,
     wrong: u8,
-    /// It is high, says the last wait.
+    /// The last wait ended with a high pin.
     raised: bool,
 }
 
@@ -46,15 +47,18 @@ impl<P: Wait> Interrupt<P> {
         self.pin.is_some()
     }
 
-    /// Forgets what the pin did wrong.
+    /// Resets the error count.
     pub(super) const fn trust(&mut self) {
         self.wrong = 0;
     }
 
-    /// Waits until samples are there: for the pin and a little, or until they are due when there is no pin.
+    /// Waits until samples are ready: for the pin plus `little`, or until they are due when there
+    /// is no usable pin.
     pub(super) async fn wait<R, T: Timebase>(&mut self, port: &mut Port<R, T>, due: Instant, little: Duration) {
         self.raised = false;
         match &mut self.pin {
+            // When samples are already due, the pin is high at best and waiting for it gains
+            // nothing.
             Some(pin) if self.wrong < PATIENCE && port.now() < due => {
                 self.raised = matches!(port.until(due + LATE, pin.wait_for_high()).await, Some(Ok(())));
                 if self.raised {
@@ -67,7 +71,7 @@ impl<P: Wait> Interrupt<P> {
         }
     }
 
-    /// Compares what the pin said with what the chip says.
+    /// Compares the pin with the chip's fill level, and counts errors.
     pub(super) const fn judge(&mut self, samples: bool) {
         if self.raised {
             self.wrong = if samples { 0 } else { self.wrong.saturating_add(1) };
@@ -75,7 +79,7 @@ impl<P: Wait> Interrupt<P> {
     }
 }
 
-/// No interrupt pin.
+/// Type of the interrupt pin when none is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPin {}
 

@@ -27,51 +27,56 @@ pub use stampfly_types::messages::ImuData;
 pub use stampfly_types::{Duration, Instant};
 use stampfly_types::{GRAVITY, Vec3};
 
-/// The chip may be accessed this long after power-on and after leaving power saving (§4 "Start-up").
+/// Wait before the first access after power-on and after leaving power saving (§4 "Start-up").
 const POWER_UP: Duration = Duration::from_micros(450);
-/// Idle time after a write in normal mode, "Interface" and timing tables of the data sheet.
+/// Pause after a write in normal mode, from "Interface" and the timing tables of the data sheet.
 const AFTER_WRITE: Duration = Duration::from_micros(2);
 const SOFT_RESET: Duration = Duration::from_micros(2_000);
-/// How long the chip may take to start with its configuration: typically 20 ms.
+/// Time limit for the start with a configuration, which typically takes 20 ms.
 const START_UP_LIMIT: Duration = Duration::from_millis(150);
-/// The gyroscope's first sample after it is switched on, 45 ms (§1.2), with a margin.
+/// Start-up of the gyroscope, 45 ms (§1.2), with a margin.
 const GYRO_START: Duration = Duration::from_millis(50);
-/// Each deflection of the self test settles for 50 ms (§4 "Sensor self-test").
+/// Settling time of each deflection in the self test, 50 ms (§4 "Sensor self-test"), with a margin.
 const SELF_TEST_SETTLE: Duration = Duration::from_millis(51);
-/// How long the gyroscope's self test may take. The data sheet gives no figure; Bosch's sensor API waits as long.
+/// Time limit of the gyroscope's self test. The data sheet gives no figure; Bosch's sensor API
+/// waits this long.
 const GYRO_SELF_TEST_LIMIT: Duration = Duration::from_secs(2);
-/// From the accelerometer on to the selection of the test, as in Bosch's sensor API.
+/// Pause between enabling the accelerometer and selecting the test, as in Bosch's sensor API.
 const BEFORE_GYRO_SELF_TEST: Duration = Duration::from_millis(1);
-/// Ticks of sensor time from a sample to the read the driver aims at, and to the earliest one it trusts: before, the
-/// FIFO may or may not hold the sample.
+/// Ticks of the sensor time from a sample to the planned read, and to the earliest read that is
+/// accepted. Earlier than that the FIFO may or may not contain the sample.
 const AIM: u64 = 3;
 const EARLIEST: u64 = 2;
-/// The FIFO of 2 kB holds 157 frames; from here on it may have lost some before the driver could look.
+/// A fill level, in frames, at which the FIFO of 2 kB, 157 frames, may already have lost some.
 const OVERRUN: u64 = 150;
-/// How often in a row a look may come when it tells nothing, because the bus was somebody else's meanwhile.
+/// Number of consecutive status reads that may be ambiguous because other devices delayed the bus.
 const DOUBTS: u32 = 32;
-/// Samples may be missing for this many output periods.
+/// Number of output periods without samples after which `next` fails.
 const PATIENCE: u64 = 4;
 
 /// The driver. Implements [`Imu`].
 ///
-/// `Sample::at` is the middle of the decimation filter: at 400 Hz three chip samples (1.9 ms) before the newest one,
-/// by the chip's clock, good to one of its ticks (39 µs) and the time that the address takes on the bus (4 µs on SPI at
-/// 10 MHz, 0.1 ms on I2C at 400 kHz). The chip's own low-pass delays a little more; that is not taken off.
+/// `Sample::at` is the centre of the decimation filter: at 400 Hz three chip samples (1.9 ms)
+/// before the newest one, by the chip's clock. It is accurate to one tick of that clock (39 µs) and
+/// the time that the address takes on the bus (4 µs on SPI at 10 MHz, 0.1 ms on I2C at 400 kHz).
+/// The small delay of the chip's own low-pass filter is not subtracted.
 ///
-/// A reader that comes late gets every sample, up to 90 ms (at 400 Hz), each stamped by the nominal rate: off by what
-/// the chip's clock is in the time it was late, 2 % of it. Beyond that, or when the FIFO holds something else than
-/// samples, it is emptied and the filter starts anew, which takes two output periods. After a read that failed or was
-/// cancelled the filter starts anew with what the FIFO still holds. Gives up on the chip ([`ChipError::NoSample`]) after
-/// four output periods without a sample.
+/// A caller that is late still gets every sample of the last 90 ms (at 400 Hz). Each is stamped by
+/// the nominal rate, so its error is that of the chip's clock over the delay, 2 %. After a longer
+/// delay, or when the FIFO contains other frames than samples, the driver empties the FIFO and
+/// restarts the filter, which takes two output periods. After a read that failed or was dropped,
+/// the filter restarts with the frames that are still in the FIFO. After four output periods
+/// without a sample the driver returns [`ChipError::NoSample`].
 ///
-/// One wrong bit on the bus costs no sample, wherever it is: a status that cannot be is read again before the chip
-/// counts as restarted, and a frame's header may have one. What it does to a measured value cannot be known.
+/// A single wrong bit on the bus loses no sample: an implausible status is read again before the
+/// chip counts as restarted, and one wrong bit in the header of a frame is tolerated. A wrong bit
+/// in a measured value cannot be detected.
 ///
-/// [`with_interrupt`](Self::with_interrupt) takes the pin that INT1 is wired to (GPIO 11 on the StampFly).
+/// [`with_interrupt`](Self::with_interrupt) takes the pin connected to INT1 (GPIO 11 on the
+/// StampFly).
 ///
 /// The chip does not run without a configuration of 8 kB that Bosch publishes with its sensor API
-/// (`bmi270_config_file`); it is not part of this crate.
+/// (`bmi270_config_file`). It is not part of this crate.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock};
@@ -94,13 +99,14 @@ pub struct Bmi270<'b, R, T, P = NoPin> {
     axes: AxisMap,
     config: Config,
     running: bool,
-    /// Between the first bit of a FIFO read and its last: set when a call was cancelled there.
+    /// A FIFO read is in progress. Still set in the next call if this one was dropped during the
+    /// read.
     reading: bool,
     decimator: Decimator,
     peak: Peak,
-    /// When to look again.
+    /// Time of the next status read.
     due: Instant,
-    /// The shortest time a status took: the bus alone, without waiting for it.
+    /// Shortest duration of a status read: the transfer alone, without waiting for the bus.
     on_bus: Duration,
     cross_axis: f32,
     temperature: f32,
@@ -114,7 +120,8 @@ impl<'b, S: SpiDevice, T: Timebase> Bmi270<'b, SpiRegisters<S>, T> {
 }
 
 impl<'b, I: I2c, T: Timebase> Bmi270<'b, I2cRegisters<I>, T> {
-    /// The chip on I2C, at 0x68 (SDO low) or 0x69. The read of a sample fills a 400 kHz bus for 1.7 ms.
+    /// The chip on I2C, at address 0x68 (SDO low) or 0x69. Reading a sample occupies a 400 kHz bus
+    /// for 1.7 ms.
     pub fn i2c(bus: I, address: u8, clock: T, blob: &'b [u8], axes: AxisMap, config: Config) -> Self {
         Self::new(I2cRegisters::new(bus, address), clock, blob, axes, config)
     }
@@ -123,7 +130,8 @@ impl<'b, I: I2c, T: Timebase> Bmi270<'b, I2cRegisters<I>, T> {
 impl<R: Wires, T, P> Bmi270<'_, R, T, P> {
     stampfly_driver_core::transfer_limit!();
 
-    /// Takes the driver apart: the bus or device, the clock, and the interrupt's pin, if it has one. The chip goes on measuring.
+    /// Takes the driver apart and returns the bus or device, the clock and the interrupt pin, if
+    /// any. The chip continues to measure.
     pub fn release(self) -> (R::Bus, T, Option<P>) {
         let (wires, clock) = self.port.release();
         (wires, clock, self.interrupt.release())
@@ -145,17 +153,18 @@ impl<'b, R: Registers, T: Timebase> Bmi270<'b, R, T> {
             due: Instant::ZERO,
             on_bus: Duration::from_secs(1),
             cross_axis: 0.0,
-            // The zero of the chip's scale, until it has measured.
+            // Zero point of the chip's scale, used until the first measurement.
             temperature: 23.0,
         }
     }
 
-    /// The same chip, with the pin its INT1 is wired to. The chip drives it, high when four samples are there.
+    /// The same driver with the pin connected to INT1. The chip drives it high when four samples
+    /// are ready.
     pub fn with_interrupt<P: Wait>(self, pin: P) -> Bmi270<'b, R, T, P> {
         let Self { port, blob, axes, config, reading, decimator, peak, due, on_bus, cross_axis, temperature, .. } =
             self;
         let interrupt = Interrupt::on(pin);
-        // It is set up anew, with the interrupt.
+        // `running: false`: the next call sets the chip up again, with the interrupt.
         Bmi270 {
             port,
             interrupt,
@@ -178,7 +187,9 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
     /// Sets the chip up: reset, identification, configuration file, sensors, FIFO. 60 to 220 ms.
     ///
     /// # Errors
-    /// Another chip, an impossible or refused configuration, the bus.
+    /// [`ChipError::Identification`], [`ChipError::InvalidConfiguration`] for a configuration file
+    /// of invalid length, [`ChipError::Configuration`] when the chip refuses the file or the
+    /// settings, and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
         self.running = false;
         self.upload().await?;
@@ -196,12 +207,14 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.write(register::PWR_CTRL, &[codec::ALL_SENSORS]).await?;
         self.write(register::PWR_CONF, &[codec::NORMAL_POWER]).await?;
         self.port.wait(GYRO_START).await;
+        // The chip rejects invalid combinations and reports them in the status.
         let kept: [u8; 4] = self.port.read(register::ACC_CONF).await?;
         let (status, ..) = self.status().await?;
         if kept != wanted || status.configuration_error {
             return Err(ChipError::Configuration { status: kept[0] });
         }
         self.temperature = status.celsius().unwrap_or(self.temperature);
+        // Read twice, because the factor stays in use until the next start.
         let [factor]: [u8; 1] = self.port.read_twice(register::GYR_CAS).await?;
         self.cross_axis = f32::from(codec::cross_axis_factor(factor)) / 512.0;
         self.restart_fifo().await?;
@@ -209,9 +222,8 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         Ok(())
     }
 
-    /// Deflects the accelerometer's masses both ways and compares. 170 ms; the vehicle has to stand still.
-    ///
-    /// Leaves the chip to be set up by the next call.
+    /// Self test of the accelerometer: deflects the proof masses in both directions and compares.
+    /// Takes 170 ms, during which the vehicle must not move. The next call sets the chip up again.
     ///
     /// # Errors
     /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
@@ -235,19 +247,21 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         if codec::passes_self_test(positive, negative) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// Lets the chip test its gyroscope's drive. The vehicle has to stand still. Given up after 2.2 s.
+    /// Self test of the gyroscope's drive, by the chip. The vehicle must not move. Takes at most
+    /// 2.2 s. The next call sets the chip up again.
     ///
-    /// The test is a feature of the configuration file: the short file that has the FIFO only fails it. The order is that
-    /// of Bosch's sensor API; the data sheet names the registers only. **Unverified** on a chip. Leaves the chip to be set
-    /// up by the next call.
+    /// The test is a feature of the full configuration file; with the short file for the FIFO only
+    /// it fails. The sequence is that of Bosch's sensor API, because the data sheet specifies only
+    /// the registers. **Unverified** on a chip.
     ///
     /// # Errors
-    /// [`ChipError::SelfTest`], also when it does not end, and those of [`start`](Self::start).
+    /// [`ChipError::SelfTest`], also on a time-out, and those of [`start`](Self::start).
     pub async fn gyro_self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         self.running = false;
         self.upload().await?;
         self.write(register::GYR_CRT_CONF, &[codec::GYRO_TEST_RUNS]).await?;
-        // The gyroscope off; the accelerometer on, which tells the test whether the vehicle stands still.
+        // Gyroscope off, accelerometer on: the test uses it to check that the vehicle does not
+        // move.
         self.write(register::PWR_CTRL, &[codec::ACCELEROMETER_ONLY]).await?;
         self.port.wait(BEFORE_GYRO_SELF_TEST).await;
         self.write(register::FEAT_PAGE, &[1]).await?;
@@ -272,12 +286,13 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         if passed { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// Reset, identification, configuration file, until the chip says it runs.
+    /// Reset, identification and configuration file, until the chip reports that it runs.
     async fn upload(&mut self) -> Result<(), ChipError<R::Error>> {
         if self.blob.is_empty() || !self.blob.len().is_multiple_of(2) || self.blob.len() > codec::BLOB_LIMIT {
             return Err(ChipError::InvalidConfiguration);
         }
-        // Until the first rising edge of its chip select the chip listens as on I2C: what this read gives is noise.
+        // The chip starts in I2C mode and changes to SPI at the first rising edge of its chip
+        // select. The result of this read is meaningless.
         let _: [u8; 1] = self.port.read(register::CHIP_ID).await?;
         self.port.wait(POWER_UP).await;
         self.write(register::CMD, &[codec::SOFT_RESET]).await?;
@@ -292,6 +307,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         self.port.wait(POWER_UP).await;
         self.write(register::INIT_CTRL, &[0]).await?;
         for (number, chunk) in self.blob.chunks(R::LONGEST_WRITE).enumerate() {
+            // The address counts in words and is set for each piece, so a piece has an even length.
             self.write(register::INIT_ADDR_0, &codec::init_address(number * R::LONGEST_WRITE)).await?;
             self.write(register::INIT_DATA, chunk).await?;
         }
@@ -302,33 +318,34 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let [status]: [u8; 1] = self.port.read(register::INTERNAL_STATUS).await?;
             match status & 0x0F {
                 Status::RUNNING => return Ok(()),
-                // Not initialised yet.
+                // Initialisation still in progress.
                 0 if looks < deadline => self.port.wait(Duration::from_millis(1)).await,
                 _ => return Err(ChipError::Configuration { status }),
             }
         }
     }
 
-    /// Writes, and leaves the chip the time it needs until the next access.
+    /// Writes, and waits for the minimum time before the next access.
     async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), ChipError<R::Error>> {
         self.port.write(register, bytes).await?;
         self.port.wait(AFTER_WRITE).await;
         Ok(())
     }
 
-    /// The status, the instant of the time in it, and how long after that at most the fill level was read.
+    /// Reads the status. Also returns the instant of the sensor time in it, and an upper bound of
+    /// the time from then until the fill level was read.
     async fn status(&mut self) -> Result<(Status, Instant, Duration), ChipError<R::Error>> {
         let asked = self.port.now();
         let status = Status::decode(&self.port.read(register::SENSORTIME_0).await?);
         let answered = self.port.now();
         let took = answered.since(asked);
         self.on_bus = self.on_bus.min(took);
-        // The time comes first, after the addresses: a quarter of the burst, on I2C as on SPI.
+        // The sensor time follows the addresses, after about a quarter of the burst on I2C and SPI.
         let before = self.on_bus / 4;
         Ok((status, answered - (self.on_bus - before), took - before))
     }
 
-    /// Empties the FIFO and forgets what the filter remembers.
+    /// Empties the FIFO and resets the filters.
     async fn restart_fifo(&mut self) -> Result<(), ChipError<R::Error>> {
         (self.decimator, self.peak) = Default::default();
         self.write(register::CMD, &[codec::FIFO_FLUSH]).await?;
@@ -337,12 +354,13 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
         Ok(())
     }
 
-    /// The time of so many samples of the chip.
+    /// Duration of this number of the chip's samples, at the nominal rate.
     fn chip_period(&self, samples: u64) -> Duration {
         ticks_to_micros(samples * self.config.rate.ticks())
     }
 
-    /// The next group of four with the instant of its first sample; `None` when there is a gap before it.
+    /// The next group of four samples with the instant of the first one; `None` when samples before
+    /// it were lost.
     async fn group(&mut self, deadline: Instant) -> Result<Option<(Instant, [[i16; 6]; 4])>, ChipError<R::Error>> {
         let mut doubts = 0;
         loop {
@@ -350,8 +368,8 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let looks = self.port.now();
             let mut asked = self.status().await?;
             if !is_believable(&asked.0) {
-                // A wrong bit on the bus is a hundred times as likely as a chip that restarted, and setting it up again
-                // takes longer than motors turn without it.
+                // A wrong bit on the bus is a hundred times as likely as a restart of the chip, and
+                // a new set-up takes longer than the motors turn without samples.
                 asked = self.status().await?;
             }
             let (status, told, after) = asked;
@@ -364,26 +382,32 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
             let age = u64::from(status.sensor_time) % period;
             let frames = u64::from(status.fifo_bytes) / FRAME_BYTES as u64;
             let newest = told - ticks_to_micros(age);
-            // Would the next sample have come while the status was on the bus?
+            // The status is ambiguous when the next sample may have arrived during its transfer.
             let ambiguous = age < EARLIEST || ticks_to_micros(age) + after >= ticks_to_micros(period);
             self.interrupt.judge(frames >= 4);
             if frames < 4 || ambiguous {
                 doubts += u32::from(ambiguous);
-                // By a look that began after that time: waiting for the bus is not the chip's.
+                // Only a read that began after the deadline counts, so that a wait for the bus is
+                // not mistaken for a failure of the chip.
                 if frames < 4 && looks > deadline || doubts > DOUBTS {
                     self.running = false;
                     return Err(ChipError::NoSample);
                 }
+                // Sample periods until four frames are complete. At least one after a read too late
+                // in its period; a read too early in it is repeated within the same period.
                 let missing = 4u64.saturating_sub(frames).max(u64::from(age >= EARLIEST));
                 self.due = newest + ticks_to_micros(missing * period + AIM);
                 continue;
             }
+            // Samples may have been lost, so the caller empties the FIFO and restarts the filter.
             if frames >= OVERRUN {
                 return Ok(None);
             }
             self.reading = true;
             let bytes = self.port.read(register::FIFO_DATA).await?;
             self.reading = false;
+            // After this read `frames` − 4 are left, so the next four are complete in 8 − `frames`
+            // periods.
             self.due = newest + ticks_to_micros(8u64.saturating_sub(frames) * period + AIM);
             let Some(group) = codec::decode_frames(&bytes, status.holds_whole_frames()) else { return Ok(None) };
             return Ok(Some((newest - self.chip_period(frames - 1), group)));
@@ -391,7 +415,7 @@ impl<R: Registers, T: Timebase, P: Wait> Bmi270<'_, R, T, P> {
     }
 }
 
-/// Is this what a chip that runs says?
+/// Whether the status is plausible for a running chip.
 const fn is_believable(status: &Status) -> bool {
     status.start_up == Status::RUNNING && status.holds_whole_frames()
 }
@@ -409,7 +433,8 @@ impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {
         }
         let deadline = self.port.now() + self.chip_period(4 * PATIENCE);
         if core::mem::take(&mut self.reading) {
-            // Nobody knows which frames that read took out; those that are still there begin anew.
+            // It is unknown which frames the dropped read has removed, so the filters restart with
+            // those that are left.
             (self.decimator, self.peak) = Default::default();
         }
         loop {
@@ -418,11 +443,12 @@ impl<R: Registers, T: Timebase, P: Wait> Imu for Bmi270<'_, R, T, P> {
                 continue;
             };
             let peak = self.peak.push(&group);
+            // The first group only fills the filter.
             let Some(sum) = self.decimator.push(&group) else { continue };
             let [ax, ay, az, gx, gy, gz] = sum.map(|sixteenths| sixteenths as f32 / Decimator::GAIN as f32);
             let scale = GRAVITY / self.config.accel_range.counts_per_g();
             let accel = Vec3::new(ax, ay, az) * scale;
-            // The factory's correction of the gyroscope's x axis (register 0x12).
+            // Factory correction of the cross-axis sensitivity of the x axis (register 0x12).
             let gyro = Vec3::new(gx - self.cross_axis * gz, gy, gz)
                 * (core::f32::consts::PI / 180.0 / self.config.gyro_range.counts_per_dps());
             let data = ImuData {

@@ -1,15 +1,18 @@
-//! The largest specific force of a group of chip samples that cannot be one sample's noise.
+//! The largest specific force on which several consecutive samples of the chip agree.
 //!
-//! A decimation filter spreads a blow over two outputs and shows a third of it in the first. What the chip itself measured shows all of
-//! it at once, but single chip samples are full of the propellers' shaking, and one flipped bit is a peak as well. So three
-//! samples running have to agree: of each axis counts what all three have on the same side of zero. For whoever has to see a blow in the
-//! sample in which it begins. Not a measurement of its size, and no input for an estimator.
+//! The decimation filter spreads an impact over two outputs and shows a third of it in the first.
+//! The chip's own samples show all of it at once, but a single sample may be noise of the
+//! propellers or a flipped bit. Three consecutive samples therefore have to agree: on each axis,
+//! the part counts that all three have on the same side of zero.
+//!
+//! For detecting an impact in the sample in which it begins. It does not measure the size of the
+//! impact, and it is not an input for an estimator.
 
-/// Samples running that have to agree: at 1600 Hz a wall at 1 m/s pushes for 8 of them, and the force of a rotor at hover (478 Hz)
-/// changes its side within two.
+/// Number of consecutive samples that have to agree. At 1600 Hz a wall hit at 1 m/s acts for 8 of
+/// them, while the force of a rotor at hover (478 Hz) changes its sign within two.
 const AGREE: usize = 3;
 
-/// Finds the peak in groups of four.
+/// Finds the peak in groups of four samples.
 ///
 /// ```
 /// use stampfly_bmi270::Peak;
@@ -21,16 +24,18 @@ const AGREE: usize = 3;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Peak {
-    /// The last samples of the group before; zero agrees with nothing.
+    /// Last samples of the previous group. Zeros, which agree with no sample, before the first
+    /// group.
     before: [[i16; 3]; AGREE - 1],
 }
 
 impl Peak {
-    /// Takes four samples of which the first three channels are an accelerometer's; gives the length of what three running have in
-    /// common, where that is largest, in counts.
+    /// Takes four samples, the first three channels of which are the accelerometer's. Returns, in
+    /// counts, the largest length of the vector that three consecutive samples have in common.
     #[must_use]
     pub fn push(&mut self, group: &[[i16; 6]; 4]) -> f32 {
         let [first, second, third, fourth] = group.map(|[x, y, z, ..]| [x, y, z]);
+        // Runs of three that cross the boundary of two groups need the last two samples.
         let [older, old] = core::mem::replace(&mut self.before, [third, fourth]);
         let runs = [[older, old, first], [old, first, second], [first, second, third], [second, third, fourth]];
         let largest = runs.iter().map(common_square).max().unwrap_or_default();
@@ -38,17 +43,18 @@ impl Peak {
     }
 }
 
-/// The square root of the `f32` nearest to this integer, to the last bit.
+/// The square root of the `f32` nearest to this integer, correctly rounded.
 ///
-/// Digit by digit and in 32 bits, so that the driver needs no library of mathematics, and a small processor no division. With d the digit that
-/// is tried and r the root so far, r + d is kept while (r + d)² is not above the square; what is left of it, doubled for each digit, says so.
+/// Computes digit by digit in 32 bits, so that the driver needs no maths library and a small
+/// processor no division. With the tried digit d and the root r so far, r + d is kept while (r +
+/// d)² is not above the square. The comparison uses the remainder, which is doubled for each digit.
 fn root(square: u32) -> f32 {
     if square == 0 {
         return 0.0;
     }
     let bits = (square as f32).to_bits();
     let exponent = (bits >> 23) - 127;
-    // The mantissa with its first bit, and an even exponent.
+    // The mantissa with its leading bit, scaled to an even exponent.
     let mut left = (bits & 0x007F_FFFF | 0x0080_0000) << (1 + exponent % 2);
     let (mut root, mut doubled, mut digit) = (0, 0, 1_u32 << 24);
     while digit > 0 {
@@ -61,16 +67,19 @@ fn root(square: u32) -> f32 {
         left <<= 1;
         digit >>= 1;
     }
-    // One digit more than an `f32` has: it rounds.
+    // One digit more than an `f32` has, for rounding.
     let rounded = (root + (root & 1)) >> 1;
     f32::from_bits(rounded - 0x0080_0000 + ((127 + exponent / 2) << 23))
 }
 
-/// The square of what three samples have in common: of each axis what is nearest to zero, if all are on one side of it. At most 3·2³⁰.
+/// The square of the vector that three samples have in common: on each axis the value nearest to
+/// zero if all are on one side of it, else zero. At most 3·2³⁰.
 fn common_square(run: &[[i16; 3]; AGREE]) -> u32 {
     let [a, b, c] = run;
     let axis = |axis: usize| {
         let [a, b, c] = [a, b, c].map(|sample| i32::from(sample[axis]));
+        // At most one of the two terms is not zero: the smallest value if all are positive, or the
+        // largest if all are negative.
         let common = a.min(b).min(c).max(0) + a.max(b).max(c).min(0);
         (common * common).unsigned_abs()
     };

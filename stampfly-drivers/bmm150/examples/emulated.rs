@@ -1,4 +1,5 @@
-//! A BMM150 emulated down to its registers, on this PC, on both kinds of wires: the same field, whichever it hangs on.
+//! Runs the driver on a register-level emulation of a BMM150 on this PC, on I2C and on SPI: both
+//! measure the same field.
 //!
 //! `cargo run -p stampfly-bmm150 --example emulated-bmm150`, in the repository.
 

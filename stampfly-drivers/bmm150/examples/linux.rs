@@ -1,7 +1,10 @@
-//! A BMM150 on a computer with Linux, such as a Raspberry Pi: on I2C at `/dev/i2c-1`, or with the argument `spi` on SPI at `/dev/spidev0.0`. Shows
-//! the magnetic field along the chip's axes.
+//! A BMM150 on a computer with Linux, such as a Raspberry Pi. Prints the magnetic field along the
+//! chip's axes.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example bmm150` there, or `cargo run --example bmm150 spi`.
+//! Wiring: I2C at `/dev/i2c-1`, or SPI at `/dev/spidev0.0` with the argument `spi`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example bmm150` or `cargo run --example bmm150 spi`.
 
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
 use linux_embedded_hal::{Delay, I2cdev, SpidevDevice};
@@ -22,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Whichever wires it hangs on.
+/// Prints samples of a magnetometer on either bus.
 fn show<E: Error + 'static>(mut compass: impl Magnetometer<Error = E>) -> Result<(), Box<dyn Error>> {
     loop {
         let sample = block_on(compass.next())?;

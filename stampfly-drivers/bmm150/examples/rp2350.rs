@@ -1,7 +1,10 @@
-//! A BMM150 on a Raspberry Pi Pico 2: SDA at GP4, SCL at GP5. Shows the magnetic field along the chip's axes
-//! through the debug probe.
+//! A BMM150 on a Raspberry Pi Pico 2. Prints the magnetic field along the chip's axes through the
+//! debug probe.
 //!
-//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example bmm150` there.
+//! Wiring: SDA GP4, SCL GP5.
+//!
+//! Build it in `stampfly-drivers/boards/rp2350`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example bmm150`.
 
 #![no_std]
 #![no_main]

@@ -1,8 +1,9 @@
-//! Registers, timing and compensation of the BMM150, from Bosch BST-BMM150-DS001. Registers are described in its
-//! chapter "Register description" by their addresses, which are given here.
+//! Registers, timing and compensation of the BMM150, from Bosch BST-BMM150-DS001. Register
+//! addresses refer to its chapter "Register description".
 //!
-//! The data sheet leaves the compensation to Bosch's sensor API; both forms here are its formulas (`bmm150.c`, BSD-3).
-//! They agree to within the integer form's rounding. Flight code uses the floating one.
+//! The data sheet refers to Bosch's sensor API for the compensation. Both forms here use its
+//! formulas (`bmm150.c`, BSD-3) and agree within the rounding of the integer form. Flight code uses
+//! the floating-point form.
 
 use super::config::Config;
 pub use super::config::{Preset, Rate};
@@ -10,33 +11,34 @@ use stampfly_types::{Duration, Vec3};
 
 /// Register addresses.
 pub mod register {
-    /// Identification, readable only with the power on.
+    /// Identification, readable only when the chip is powered on.
     pub const CHIP_ID: u8 = 0x40;
-    /// Data, status and modes up to 0x4C in one burst: see [`Reading`](super::Reading).
+    /// Data, status and modes up to 0x4C, read in one burst: see [`Reading`](super::Reading).
     pub const DATA_X_LSB: u8 = 0x42;
-    /// Power and reset.
+    /// Power control and reset.
     pub const POWER: u8 = 0x4B;
     /// Rate, mode, self test.
     pub const MODE: u8 = 0x4C;
-    /// Repetitions of x and y.
+    /// Number of repetitions of x and y.
     pub const REPETITIONS_XY: u8 = 0x51;
-    /// Repetitions of z.
+    /// Number of repetitions of z.
     pub const REPETITIONS_Z: u8 = 0x52;
     /// Factory trim, 21 bytes.
     pub const TRIM: u8 = 0x5D;
 }
 
-/// What [`register::CHIP_ID`] reads.
+/// Value of [`register::CHIP_ID`].
 pub const CHIP_ID_VALUE: u8 = 0x32;
-/// Power on, and SPI of four wires, in [`register::POWER`].
+/// Power on and four-wire SPI, in [`register::POWER`].
 pub const POWER_ON: u8 = 0x01;
-/// Reset with the power left on, in [`register::POWER`].
+/// Reset without a change of the power control, in [`register::POWER`].
 pub const SOFT_RESET: u8 = 0x83;
-/// Sleep and start the self test, in [`register::MODE`]; its lowest bit falls when the test is over.
+/// Sleep mode and start of the self test, in [`register::MODE`]. The chip clears the lowest bit at
+/// the end of the test.
 pub const SELF_TEST: u8 = 0x07;
 
 impl Preset {
-    /// Registers 0x51 and 0x52: 1 + 2 a repetitions of x and y, 1 + b of z.
+    /// Registers 0x51 (a) and 0x52 (b): 1 + 2 a repetitions of x and y, 1 + b of z.
     #[must_use]
     pub const fn codes(self) -> [u8; 2] {
         match self {
@@ -47,7 +49,8 @@ impl Preset {
         }
     }
 
-    /// How long a measurement takes: 145 µs per repetition of x and y, 500 µs per repetition of z, and 980 µs.
+    /// Duration of a measurement: 145 µs per repetition of x and y, 500 µs per repetition of z, and
+    /// 980 µs.
     #[must_use]
     pub const fn duration(self) -> Duration {
         let [xy, z] = self.codes();
@@ -86,29 +89,29 @@ impl Rate {
     }
 }
 
-/// MODE: this rate, normal operation.
+/// MODE for this rate and normal operation.
 #[must_use]
 pub const fn mode_bits(config: &Config) -> u8 {
     config.rate.code() << 3
 }
 
-/// Data and status: registers 0x42 to 0x4C in one burst.
+/// Data and status: registers 0x42 to 0x4C, read in one burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    /// x and y, 13 bits; z, 15 bits; counts.
+    /// x and y with 13 bits, z with 15 bits, in counts.
     pub raw: [i16; 3],
     /// Hall resistance, 14 bits.
     pub hall: u16,
-    /// The data is new. It is part of the data, so reading both at once cannot miss or repeat a sample.
+    /// The data is new. This flag is part of the burst, so no sample is missed or repeated.
     pub ready: bool,
-    /// POWER, as the chip holds it.
+    /// POWER as read back from the chip.
     pub power: u8,
-    /// MODE, as the chip holds it.
+    /// MODE as read back from the chip.
     pub mode: u8,
 }
 
 impl Reading {
-    /// Takes the burst apart.
+    /// Decodes the burst.
     #[must_use]
     pub const fn decode(burst: &[u8; 11]) -> Self {
         let [x0, x1, y0, y1, z0, z1, r0, r1, _interrupt, power, mode] = *burst;
@@ -125,7 +128,7 @@ impl Reading {
         }
     }
 
-    /// Did no axis overflow? One that did reads its most negative number.
+    /// Whether no axis has overflowed. An axis that has reads its most negative number.
     #[must_use]
     pub fn is_in_range(&self) -> bool {
         let [x, y, z] = self.raw;
@@ -133,14 +136,14 @@ impl Reading {
     }
 }
 
-/// Did all three axes pass the self test? Their lowest data bits say so afterwards.
+/// Whether all three axes passed the self test. The lowest data bit of each axis holds its result.
 #[must_use]
 pub const fn passes_self_test(data: &[u8; 6]) -> bool {
     let [x, _, y, _, z, _] = *data;
     x & y & z & 1 != 0
 }
 
-/// Factory trim of one chip.
+/// Factory trim of an individual chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names are the sensor API's, without dig_")]
 pub struct Trim {
@@ -158,7 +161,7 @@ pub struct Trim {
 }
 
 impl Trim {
-    /// Takes the trim registers apart; `None` when they hold none.
+    /// Decodes the trim registers; `None` when they are empty.
     #[must_use]
     pub fn decode(bytes: &[u8; 21]) -> Option<Self> {
         let [x1, y1, _, _, _, z4l, z4h, x2, y2, _, _, z2l, z2h, z1l, z1h, xyz1l, xyz1h, z3l, z3h, xy2, xy1] = *bytes;
@@ -178,7 +181,8 @@ impl Trim {
         (trim.xyz1 != 0 && trim.z1 != 0 && trim.z2 != 0 && *bytes != [0xFF; 21]).then_some(trim)
     }
 
-    /// Flux density along the chip's axes, µT; `None` on overflow or when the trim gives no number.
+    /// Flux density along the chip's axes, µT. `None` on overflow or when the trim does not yield a
+    /// finite value.
     #[must_use]
     pub fn compensate(&self, reading: &Reading) -> Option<Vec3> {
         if !reading.is_in_range() {
@@ -186,7 +190,7 @@ impl Trim {
         }
         let [x, y, z] = reading.raw.map(f32::from);
         let hall = f32::from(reading.hall);
-        // How far the Hall resistance, that is the temperature, is from the factory's.
+        // Deviation of the Hall resistance, and thus of the temperature, from the factory's.
         let drift = f32::from(self.xyz1) * 16_384.0 / hall - 16_384.0;
         let gain =
             f32::from(self.xy2) * (drift * drift / 268_435_456.0) + drift * f32::from(self.xy1) / 16_384.0 + 256.0;
@@ -200,7 +204,7 @@ impl Trim {
         field.iter().all(|value| value.is_finite()).then_some(field)
     }
 
-    /// The same in integers, in sixteenths of a µT, for parts without floating point.
+    /// The same with integers, in sixteenths of a µT, for processors without floating point.
     #[must_use]
     pub fn compensate_integer(&self, reading: &Reading) -> Option<[i32; 3]> {
         if !reading.is_in_range() {
@@ -225,7 +229,7 @@ impl Trim {
 mod tests {
     use super::*;
 
-    /// Trim of the usual size.
+    /// A trim of typical size.
     const TRIM: Trim =
         Trim { x1: 0, y1: -3, x2: 26, y2: 24, z1: 24_747, z2: 763, z3: 0, z4: 0, xy1: 29, xy2: -3, xyz1: 7_053 };
 
@@ -235,7 +239,8 @@ mod tests {
 
     #[test]
     fn at_the_factorys_temperature_the_scale_is_the_trims_alone() {
-        // No drift: x · 256 · 186 / 8192 / 16 and z · 131072 / (763 + 24747 · 7053 / 32768) / 4 / 16, by hand.
+        // Without drift: x · 256 · 186 / 8192 / 16 and z · 131072 / (763 + 24747 · 7053 / 32768) /
+        // 4 / 16.
         let field = TRIM.compensate(&reading([100, 0, 500], 7_053)).expect("in range");
         assert!((field.x - 36.328_125).abs() < 1e-4, "{field}");
         assert!((field.y - -1.5).abs() < 1e-4, "{field}");
@@ -268,7 +273,7 @@ mod tests {
             assert_eq!(TRIM.compensate_integer(&reading(raw, 7_053)), None);
         }
         assert_eq!(TRIM.compensate(&reading([1, 1, 1], 0)), None);
-        // A denominator of nothing.
+        // A zero denominator.
         let broken = Trim { z1: 32_768, z2: -7_053, ..TRIM };
         assert_eq!(broken.compensate(&reading([1, 1, 1], 7_053)), None);
         assert_eq!(broken.compensate_integer(&reading([1, 1, 1], 7_053)), None);
@@ -294,7 +299,7 @@ mod tests {
 
     #[test]
     fn the_presets_are_those_of_the_table() {
-        // Recommended presets: repetitions and the rate they allow.
+        // Recommended presets: repetitions, and the rate they allow.
         for (preset, xy, z, hertz) in [
             (Preset::LowPower, 3, 3, 300.0),
             (Preset::Regular, 9, 15, 100.0),

@@ -1,12 +1,13 @@
-//! What a BMM150 is told: repetitions and rate. How the registers say it is in [`codec`](super::codec).
+//! Configuration of a BMM150: repetitions and rate. The register codes are in
+//! [`codec`](super::codec).
 
-/// What the chip is told.
+/// Configuration of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// Repetitions in a sample.
+    /// Number of repetitions per sample.
     pub preset: Preset,
-    /// Samples per second. What the preset cannot do is
+    /// Sample rate. A rate that is too high for the preset is
     /// [`ChipError::InvalidConfiguration`](crate::ChipError::InvalidConfiguration).
     pub rate: Rate,
 }
@@ -18,7 +19,7 @@ impl Default for Config {
     }
 }
 
-/// How often the axes are measured for one sample (table "Recommended presets").
+/// Number of repetitions of each axis in a sample (table "Recommended presets").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -29,7 +30,7 @@ pub enum Preset {
     HighAccuracy,
 }
 
-/// Samples per second.
+/// Sample rate, Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]

@@ -19,19 +19,20 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::MagData;
 pub use stampfly_types::{Duration, Instant};
 
-/// From power-on of the chip's logic to the first access: 3 ms.
+/// Time from power-on of the chip's logic to the first access: 3 ms.
 const START_UP: Duration = Duration::from_millis(3);
-/// How long the self test may take.
+/// Time limit of the self test.
 const SELF_TEST_LIMIT: Duration = Duration::from_millis(20);
-/// How often the data is looked at once it may be new.
+/// Pause between two reads of the data while new data is expected.
 const POLL: Duration = Duration::from_millis(2);
 
 /// The driver. Implements [`Magnetometer`].
 ///
-/// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip. A field beyond the
-/// range is [`ChipError::Data`]. The chip keeps only its newest sample and does not say since when: a reader that comes
-/// late gets the one after it, and so does one whose call was dropped on the bus. `next` ends within two periods and
-/// 20 ms, 10 ms later when it sets the chip up.
+/// `Sample::at` is the middle of the measurement, accurate to the 2 ms between two reads of the
+/// chip. A field out of range is [`ChipError::Data`]. The chip stores only its newest sample and
+/// not its time, so a late caller gets the following sample, as does a caller whose previous call
+/// was dropped during a transfer. `next` returns within two periods and 20 ms, 10 ms later when it
+/// sets the chip up.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock};
@@ -50,26 +51,26 @@ pub struct Bmm150<R, T> {
     port: Port<R, T>,
     axes: AxisMap,
     config: Config,
-    /// `None` while the chip is not set up.
+    /// Trim of the chip; `None` until it is set up.
     trim: Option<Trim>,
-    /// When the next sample may be there.
+    /// Earliest time of the next sample.
     due: Instant,
 }
 
 impl Bmm150<(), ()> {
-    /// Address with CSB and SDO at ground, as on the StampFly.
+    /// Address with CSB and SDO connected to ground, as on the StampFly.
     pub const ALL_LOW: u8 = 0x10;
 }
 
 impl<I: I2c, T: Timebase> Bmm150<I2cRegisters<I>, T> {
-    /// The chip with this address, its pin PS at the supply.
+    /// The chip with this address on I2C, with its pin PS at the supply voltage.
     pub const fn i2c(bus: I, address: u8, clock: T, axes: AxisMap, config: Config) -> Self {
         Self::new(I2cRegisters::new(bus, address), clock, axes, config)
     }
 }
 
 impl<S: SpiDevice, T: Timebase> Bmm150<SpiRegisters<S, 0>, T> {
-    /// The chip on SPI of four wires, mode 0 or 3, up to 10 MHz, its pin PS at ground.
+    /// The chip on four-wire SPI, mode 0 or 3, up to 10 MHz, with its pin PS at ground.
     pub const fn spi(device: S, clock: T, axes: AxisMap, config: Config) -> Self {
         Self::new(SpiRegisters(device), clock, axes, config)
     }
@@ -87,12 +88,13 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
     /// Sets the chip up: power, reset, identification, trim, repetitions, rate. 7 ms.
     ///
     /// # Errors
-    /// Another chip, one without trim, an impossible configuration, the bus.
+    /// [`ChipError::Identification`], [`ChipError::Data`] for a missing trim,
+    /// [`ChipError::InvalidConfiguration`], and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
         self.set_up().await.map(|_| ())
     }
 
-    /// Lets the chip deflect its own sensors. 10 to 30 ms; leaves the chip to be set up by the next call.
+    /// Runs the self test of the chip. Takes 10 to 30 ms; the next call sets the chip up again.
     ///
     /// # Errors
     /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
@@ -115,10 +117,10 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
         if codec::passes_self_test(&data) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// From whatever state to sleep, with the identification checked.
+    /// Resets the chip from any state, leaves it in sleep mode and checks its identification.
     async fn wake(&mut self) -> Result<(), ChipError<R::Error>> {
         self.trim = None;
-        // Without power nothing but this register answers.
+        // In suspend mode only this register can be accessed.
         self.port.write(register::POWER, &[codec::POWER_ON]).await?;
         self.port.wait(START_UP).await;
         self.port.write(register::POWER, &[codec::SOFT_RESET]).await?;
@@ -128,6 +130,7 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
     }
 
     async fn set_up(&mut self) -> Result<Trim, ChipError<R::Error>> {
+        // A measurement has to fit into the period.
         if self.config.preset.duration() > self.config.rate.period() {
             return Err(ChipError::InvalidConfiguration);
         }
@@ -142,23 +145,26 @@ impl<R: Registers, T: Timebase> Bmm150<R, T> {
         Ok(trim)
     }
 
-    /// Waits for new data, and gives it with the instant it was seen.
+    /// Waits for new data. Returns it with the time of the read that found it.
     async fn reading(&mut self) -> Result<(Instant, Reading), ChipError<R::Error>> {
         let period = self.config.rate.period();
         let asked = self.port.now();
         let deadline = asked + period + period;
+        // Data that may have been ready for some time has an unknown age: discard it and wait for
+        // the next sample.
         let mut stale = asked > self.due + period / 8;
         self.port.wait_until(self.due).await;
         loop {
             let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::DATA_X_LSB).await?);
             let now = self.port.now();
+            // Power and mode are part of every burst, so a restart is detected at once.
             if reading.power & codec::POWER_ON == 0 || reading.mode != codec::mode_bits(&self.config) {
                 self.trim = None;
                 return Err(ChipError::Restarted);
             }
             if reading.ready && !stale {
-                // A little early: the chip's clock may be fast by a few per cent.
+                // Slightly early, because the chip's clock may be fast by a few per cent.
                 self.due = now + period - period / 16;
                 return Ok((now, reading));
             }
@@ -182,6 +188,7 @@ impl<R: Registers, T: Timebase> Magnetometer for Bmm150<R, T> {
         };
         let (seen, reading) = self.reading().await?;
         let field = trim.compensate(&reading).ok_or(ChipError::Data)?;
+        // The data was ready at the end of the measurement.
         let at = seen - self.config.preset.duration() / 2;
         Ok(Sample { at, data: MagData { field: self.axes.to_body(field) } })
     }

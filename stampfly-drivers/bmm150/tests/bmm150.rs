@@ -1,4 +1,4 @@
-//! The BMM150 driver against a chip of closures with a rhythm of its own.
+//! Tests of the BMM150 driver on a chip made of closures that samples with its own period.
 
 use stampfly_bmm150::{Bmm150, Config, Preset, Rate};
 use stampfly_driver_core::blocking::block_on;
@@ -18,7 +18,7 @@ struct Chip {
     begun: Instant,
     period: u64,
     reported: u64,
-    /// Lowest bits of x, y, z after a self test.
+    /// Lowest bits of x, y and z after a self test.
     self_test: [u8; 3],
     fault: Option<Fault>,
 }

@@ -1,4 +1,5 @@
-//! A BMP280 emulated down to its registers, on this PC: the driver measures a simulated day, and the truth stands beside it.
+//! Runs the driver on a register-level emulation of a BMP280 on this PC. Prints its measurements of
+//! a simulated day next to the true values.
 //!
 //! `cargo run -p stampfly-bmp280 --example emulated-bmp280`, in the repository.
 

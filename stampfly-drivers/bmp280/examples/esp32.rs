@@ -1,8 +1,11 @@
-//! A BMP280 on an ESP32-C6, without an executor: SDA at GPIO6, SCL at GPIO7. Shows pressure, temperature and height
-//! on the serial port.
+//! A BMP280 on an ESP32-C6 without an executor. Prints pressure, temperature and height on the
+//! serial port.
 //!
-//! `stampfly-drivers/boards/esp32` has the versions of the crates and the linker's settings: `cargo run --release --example bmp280` there. On
-//! another ESP32 only the pins' names change.
+//! Wiring: SDA GPIO6, SCL GPIO7.
+//!
+//! Build it in `stampfly-drivers/boards/esp32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example bmp280`. On another ESP32 only the names of the
+//! pins differ.
 
 #![no_std]
 #![no_main]

@@ -1,7 +1,10 @@
-//! A BMP280 on a computer with Linux, such as a Raspberry Pi: on I2C at `/dev/i2c-1`, or with the argument `spi` on SPI at `/dev/spidev0.0`. Shows
-//! pressure, temperature and height.
+//! A BMP280 on a computer with Linux, such as a Raspberry Pi. Prints pressure, temperature and
+//! height.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example bmp280` there, or `cargo run --example bmp280 spi`.
+//! Wiring: I2C at `/dev/i2c-1`, or SPI at `/dev/spidev0.0` with the argument `spi`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example bmp280` or `cargo run --example bmp280 spi`.
 
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
 use linux_embedded_hal::{Delay, I2cdev, SpidevDevice};

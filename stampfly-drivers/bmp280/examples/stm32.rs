@@ -1,7 +1,10 @@
-//! A BMP280 on an STM32F411 (a "Black Pill"): SCK at PA5, SDI at PA7, SDO at PA6, chip select at PA4. Shows pressure, temperature and height
-//! through the debug probe.
+//! A BMP280 on an STM32F411 ("Black Pill"). Prints pressure, temperature and height through the
+//! debug probe.
 //!
-//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example bmp280` there.
+//! Wiring: SCK PA5, SDI PA7, SDO PA6, chip select PA4.
+//!
+//! Build it in `stampfly-drivers/boards/stm32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example bmp280`.
 
 #![no_std]
 #![no_main]

@@ -13,7 +13,7 @@ pub mod register {
     pub const ID: u8 = 0xD0;
     /// Reset, §4.3.2.
     pub const RESET: u8 = 0xE0;
-    /// Status, §4.3.3; the [`Reading`](super::Reading) burst begins here.
+    /// Status, §4.3.3; first register of the [`Reading`](super::Reading) burst.
     pub const STATUS: u8 = 0xF3;
     /// Oversampling and mode, §4.3.4.
     pub const CTRL_MEAS: u8 = 0xF4;
@@ -21,17 +21,18 @@ pub mod register {
     pub const CONFIG: u8 = 0xF5;
 }
 
-/// What [`register::ID`] reads: BMP280, and BME280, which measures pressure the same way.
+/// Values of [`register::ID`]: BMP280, and BME280, which measures pressure in the same way.
 pub const IDENTIFICATIONS: [u8; 2] = [0x58, 0x60];
-/// Written to [`register::RESET`].
+/// Value that [`register::RESET`] takes for a reset.
 pub const SOFT_RESET: u8 = 0xB6;
-/// One conversion, then sleep, §3.6.2.
+/// One conversion followed by sleep, §3.6.2.
 pub const FORCED: u8 = 0x01;
-/// The mode in [`register::CTRL_MEAS`], which is sleep, zero, again after a forced conversion, §4.3.4.
+/// Mask of the mode in [`register::CTRL_MEAS`]. The chip returns to sleep, zero, after a forced
+/// conversion, §4.3.4.
 pub const MODE: u8 = 0x03;
-/// A conversion is running, §4.3.3.
+/// A conversion is in progress, §4.3.3.
 pub const MEASURING: u8 = 0x08;
-/// Calibration is being copied, §4.3.3.
+/// The chip copies its calibration, §4.3.3.
 pub const COPYING: u8 = 0x01;
 
 impl Oversampling {
@@ -44,25 +45,26 @@ impl Oversampling {
     }
 }
 
-/// CTRL_MEAS without a mode.
+/// CTRL_MEAS without the mode.
 #[must_use]
 pub const fn oversampling_bits(config: &Config) -> u8 {
     config.temperature.code() << 5 | config.pressure.code() << 2
 }
 
-/// CONFIG: the filter; the standby time plays no role, and without bit 0 SPI has four wires.
+/// CONFIG with the filter. The standby time is not used, and bit 0 stays zero for four-wire SPI.
 #[must_use]
 pub const fn filter_bits(config: &Config) -> u8 {
     (config.filter as u8) << 2
 }
 
-/// The longest a conversion takes, §3.8.1 table 13.
+/// Maximum duration of a conversion, §3.8.1 table 13.
 #[must_use]
 pub const fn conversion_limit(config: &Config) -> Duration {
     Duration::from_micros(1_250 + 2_300 * (config.temperature.conversions() + config.pressure.conversions()) + 575)
 }
 
-/// From the start of a typical conversion to the middle of its pressure part, which is the second, §3.8.1 and §3.3.
+/// Time from the start of a typical conversion to the middle of its pressure part, which follows
+/// the temperature part, §3.8.1 and §3.3.
 #[must_use]
 pub const fn pressure_instant(config: &Config) -> Duration {
     Duration::from_micros(
@@ -70,14 +72,14 @@ pub const fn pressure_instant(config: &Config) -> Duration {
     )
 }
 
-/// Status, configuration and data: registers 0xF3 to 0xFC in one burst.
+/// Status, configuration and data: registers 0xF3 to 0xFC, read in one burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    /// A conversion is running, §4.3.3.
+    /// A conversion is in progress, §4.3.3.
     pub measuring: bool,
-    /// CTRL_MEAS without its mode, as the chip holds it.
+    /// CTRL_MEAS without the mode, as read back from the chip.
     pub oversampling_bits: u8,
-    /// CONFIG without its standby time, as the chip holds it.
+    /// CONFIG without the standby time, as read back from the chip.
     pub filter_bits: u8,
     /// Uncompensated pressure, 20 bits, §4.3.6.
     pub pressure: i32,
@@ -86,10 +88,10 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// What a measurement that was never made reads, §4.3.6.
+    /// Value of a measurement that has not been made, §4.3.6.
     pub const SKIPPED: i32 = 0x8_0000;
 
-    /// Takes the burst apart.
+    /// Decodes the burst.
     #[must_use]
     pub const fn decode(burst: &[u8; 10]) -> Self {
         let [status, control, config, _, p2, p1, p0, t2, t1, t0] = *burst;
@@ -103,7 +105,7 @@ impl Reading {
     }
 }
 
-/// Factory calibration of one chip, §3.11.2 table 17.
+/// Factory calibration of an individual chip, §3.11.2 table 17.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Calibration {
     /// dig_T1.
@@ -119,14 +121,14 @@ pub struct Calibration {
 /// Temperature and pressure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compensated {
-    /// Hundredths of a degree Celsius.
+    /// Temperature, hundredths of a degree Celsius.
     pub temperature: i32,
-    /// Pascals, with eight bits after the point.
+    /// Pressure, Pa, with eight fractional bits.
     pub pressure: u32,
 }
 
 impl Calibration {
-    /// Takes the calibration registers apart; `None` when they hold none.
+    /// Decodes the calibration registers; `None` when they are empty.
     #[must_use]
     pub fn decode(bytes: &[u8; 24]) -> Option<Self> {
         let (words, _) = bytes.as_chunks::<2>();
@@ -139,15 +141,16 @@ impl Calibration {
         (t1 != 0 && t1 != u16::MAX && p1 != 0 && p1 != u16::MAX).then_some(Self { t1, t, p1, p })
     }
 
-    /// Compensates a reading with 64-bit integers, §3.11.3; `None` when the result cannot be represented.
+    /// Compensates a reading with 64-bit integers, §3.11.3. `None` when the result cannot be
+    /// represented.
     ///
-    /// The data sheet's intermediate steps are kept, so the result is the same to the last bit.
+    /// Keeps the intermediate steps of the data sheet, so that the result is bit-identical.
     #[must_use]
     pub fn compensate(&self, raw_temperature: i32, raw_pressure: i32) -> Option<Compensated> {
         let [t2, t3] = self.t.map(i64::from);
         let [p2, p3, p4, p5, p6, p7, p8, p9] = self.p.map(i64::from);
         let (t1, p1) = (i64::from(self.t1), i64::from(self.p1));
-        // Temperature. Twenty bits in, so nothing here leaves 2³⁵.
+        // Temperature. The input has 20 bits, so no intermediate value exceeds 2³⁵.
         let raw = i64::from(raw_temperature & 0xF_FFFF);
         let linear = (((raw >> 3) - (t1 << 1)) * t2) >> 11;
         let offset = (raw >> 4) - t1;
@@ -159,7 +162,8 @@ impl Calibration {
         let sensitivity = ((1i64 << 47) + slope).checked_mul(p1)? >> 33;
         let raw = i64::from(0x10_0000 - (raw_pressure & 0xF_FFFF));
         let scaled = ((raw << 31) - offset).checked_mul(3_125)?.checked_div(sensitivity)?;
-        // Four times the chip's range: beyond it the calibration is nonsense, and the parabola could overflow.
+        // Four times the range of the chip. Beyond it the calibration is invalid, and the parabola
+        // could overflow.
         if !(0..1 << 34).contains(&scaled) {
             return None;
         }
@@ -187,8 +191,8 @@ mod tests {
     fn the_data_sheets_example_comes_out() {
         let Compensated { temperature, pressure } = EXAMPLE.compensate(519_888, 415_148).expect("a result");
         assert_eq!(temperature, 2_508, "25.08 °C");
-        // The figure prints 25 767 236 (100 653.27 Pa), which is of floating point; the integer formula beside it gives
-        // three units less, a hundredth of a pascal.
+        // The figure prints 25 767 236 (100 653.27 Pa), the result in floating point. The integer
+        // formula next to it yields three units less, a hundredth of a pascal.
         assert_eq!(pressure, 25_767_233);
     }
 
@@ -230,7 +234,7 @@ mod tests {
     #[test]
     fn the_times_are_those_of_the_table() {
         use Oversampling::{X1, X2, X4, X8, X16};
-        // Table 13: pressure and temperature oversampling, longest time in ms.
+        // Table 13: oversampling of pressure and temperature, maximum time in ms.
         for (pressure, temperature, limit) in
             [(X1, X1, 6.4), (X2, X1, 8.7), (X4, X1, 13.3), (X8, X1, 22.5), (X16, X2, 43.2)]
         {

@@ -1,24 +1,25 @@
-//! What a BMP280 and its driver are told: averages, low-pass, interval. How the registers say it is in
-//! [`codec`](super::codec).
+//! Configuration of a BMP280 and its driver: oversampling, filter, interval. The register codes are
+//! in [`codec`](super::codec).
 
 use stampfly_types::Duration;
 
-/// What the driver and the chip are told.
+/// Configuration of the chip and the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// Pressure conversions in a sample.
+    /// Number of pressure conversions per sample.
     pub pressure: Oversampling,
-    /// Temperature conversions in a sample.
+    /// Number of temperature conversions per sample.
     pub temperature: Oversampling,
-    /// Low-pass over samples.
+    /// Low-pass filter of the chip, over samples.
     pub filter: Filter,
-    /// Time between two samples; never less than a conversion takes.
+    /// Time between two samples. The driver extends it to the duration of a conversion if
+    /// necessary.
     pub interval: Duration,
 }
 
 impl Default for Config {
-    /// Four pressure conversions, two of temperature, a light filter, 25 Hz.
+    /// Four conversions of pressure, two of temperature, filter coefficient 4, 25 Hz.
     fn default() -> Self {
         Self {
             pressure: Oversampling::X4,
@@ -29,7 +30,7 @@ impl Default for Config {
     }
 }
 
-/// Conversions averaged into one, §3.3.1 and §3.3.2.
+/// Number of conversions averaged into one, §3.3.1 and §3.3.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -41,7 +42,8 @@ pub enum Oversampling {
     X16,
 }
 
-/// Coefficient of the chip's low-pass, §3.3.3: a step has arrived by three quarters after about as many samples.
+/// Coefficient of the chip's low-pass filter, §3.3.3. After this number of samples the output has
+/// reached about three quarters of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]

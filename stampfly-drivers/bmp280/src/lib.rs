@@ -17,27 +17,28 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::BaroData;
 pub use stampfly_types::{Duration, Instant};
 
-/// From reset to the first access, §1 table 2.
+/// Time from a reset to the first access, §1 table 2.
 const START_UP: Duration = Duration::from_millis(2);
-/// How long the chip may copy its calibration.
+/// Time limit for the chip to copy its calibration.
 const COPY_LIMIT: Duration = Duration::from_millis(20);
-/// How often a conversion may not start, as far as can be seen, before the chip counts as broken.
+/// Number of conversions that do not start before the chip counts as faulty.
 const ATTEMPTS: usize = 2;
-/// How often it is started in all: where neighbours fill the bus, the look at it may come when it is over, and tells nothing.
+/// Number of attempts in total. On a busy bus the check may come after the end of the conversion,
+/// and then shows nothing.
 const STARTS: usize = 16;
 const POLL: Duration = Duration::from_millis(1);
-/// What the chip can measure, Pa with eight bits after the point, §1 table 2.
+/// Range of the chip, Pa with eight fractional bits, §1 table 2.
 const RANGE: core::ops::RangeInclusive<u32> = 30_000 << 8..=110_000 << 8;
-/// Where it works, hundredths of a degree Celsius, §1 table 2.
+/// Operating temperature of the chip, hundredths of a degree Celsius, §1 table 2.
 const WORKS_AT: core::ops::RangeInclusive<i32> = -4_000..=8_500;
 
 /// The driver. Implements [`Barometer`].
 ///
-/// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is not taken off. A call
-/// that is dropped loses its conversion, and the next one starts another when that one is over. The driver asks whether a
-/// conversion has really started, so none is delivered twice. Pressures
-/// outside of what the chip can measure are [`ChipError::Data`]. `next` ends within an interval and two conversions, 30 ms
-/// later when it sets the chip up.
+/// `Sample::at` is the middle of the pressure conversion; the filter's delay of a few samples is
+/// not subtracted. A call that is dropped loses its conversion, and the next call starts another
+/// one after its end. The driver checks that each conversion has started, so none is delivered
+/// twice. A pressure out of the chip's range is [`ChipError::Data`]. `next` returns within an
+/// interval and two conversions, 30 ms later when it sets the chip up.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock};
@@ -56,30 +57,31 @@ const WORKS_AT: core::ops::RangeInclusive<i32> = -4_000..=8_500;
 pub struct Bmp280<R, T> {
     port: Port<R, T>,
     config: Config,
-    /// `None` while the chip is not set up.
+    /// Calibration of the chip; `None` until it is set up.
     calibration: Option<Calibration>,
-    /// When the next conversion may begin.
+    /// Earliest start of the next conversion.
     due: Instant,
 }
 
 impl Bmp280<(), ()> {
-    /// Address with SDO at ground, as on the StampFly.
+    /// Address with SDO connected to ground, as on the StampFly.
     pub const SDO_LOW: u8 = 0x76;
-    /// Address with SDO at the supply.
+    /// Address with SDO at the supply voltage.
     pub const SDO_HIGH: u8 = 0x77;
 }
 
 impl<I: I2c, T: Timebase> Bmp280<I2cRegisters<I>, T> {
-    /// The chip with this address, its CSB at the supply.
+    /// The chip with this address on I2C, with its pin CSB at the supply voltage.
     pub const fn i2c(bus: I, address: u8, clock: T, config: Config) -> Self {
         Self::new(I2cRegisters::new(bus, address), clock, config)
     }
 }
 
 impl<S: SpiDevice, T: Timebase> Bmp280<SpiRegisters<S, 0>, T> {
-    /// The chip on SPI of four wires, mode 0 or 3, up to 10 MHz.
+    /// The chip on four-wire SPI, mode 0 or 3, up to 10 MHz.
     ///
-    /// From the first time that its CSB is low the chip is deaf on I2C, until it loses its power (§5.1).
+    /// The first low level on CSB disables the chip's I2C interface until it loses its power
+    /// (§5.1).
     pub const fn spi(device: S, clock: T, config: Config) -> Self {
         Self::new(SpiRegisters(device), clock, config)
     }
@@ -97,27 +99,29 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
     /// Sets the chip up: reset, identification, calibration, filter. A few milliseconds.
     ///
     /// # Errors
-    /// Another chip, one without calibration, the bus.
+    /// [`ChipError::Identification`], [`ChipError::Data`] for a missing calibration, and errors of
+    /// the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<R::Error>> {
         self.set_up().await.map(|_| ())
     }
 
-    /// Sets the chip up, has it keep its settings and make one conversion. 20 ms by default, within 0.4 s however slow the
-    /// bus, with [`TransferLimit::I2C_SENSORS`]; an oversampling of 16 adds 60 ms.
+    /// Sets the chip up, checks that it keeps its settings, and makes one conversion. 20 ms by
+    /// default, at most 0.4 s on a slow bus with [`TransferLimit::I2C_SENSORS`]; 60 ms more with an
+    /// oversampling of 16.
     ///
-    /// The chip has no self test of its own: this one asks whether pressure and temperature are what it can measure at all.
-    /// Afterwards the chip is set up, and the next sample comes in its rhythm.
+    /// The chip has no self test of its own: this one checks that pressure and temperature are in
+    /// its range. The chip is set up afterwards, and the next sample follows after the interval.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start), among them [`ChipError::Data`] for a calibration that cannot be;
-    /// [`ChipError::Configuration`] for a setting that was not kept, with what is there instead;
-    /// [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for one that measured nothing, or something
-    /// outside of 300 to 1100 hPa and −40 to 85 °C (§1).
+    /// Those of [`start`](Self::start), including [`ChipError::Data`] for an invalid calibration;
+    /// [`ChipError::Configuration`] for a setting that was not kept, with the value read back;
+    /// [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for an empty result or
+    /// one outside 300 to 1100 hPa and −40 to 85 °C (§1).
     pub async fn self_test(&mut self) -> Result<(), ChipError<R::Error>> {
         let calibration = self.set_up().await?;
         let wanted = [codec::oversampling_bits(&self.config), codec::filter_bits(&self.config)];
         let [oversampling, _] = wanted;
-        // Without a mode: asleep.
+        // Without a mode the chip stays asleep.
         self.port.write(register::CTRL_MEAS, &[oversampling]).await?;
         let kept: [u8; 2] = self.port.read(register::CTRL_MEAS).await?;
         for (wanted, status) in wanted.into_iter().zip(kept) {
@@ -165,22 +169,26 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
         Ok(calibration)
     }
 
-    /// Starts a conversion, and gives the instant.
+    /// Starts a conversion and returns the time of the start.
     ///
-    /// Without one the data registers hold the conversion before, and nothing tells the two apart.
+    /// If it did not start, the data registers would still hold the previous conversion, which
+    /// looks the same as a new one.
     async fn begin(&mut self) -> Result<Instant, ChipError<R::Error>> {
         let limit = codec::conversion_limit(&self.config);
         let mut failed = 0;
         for _ in 0..STARTS {
+            // Set before the write, so that time spent waiting for the bus does not lengthen the
+            // interval.
             self.due = self.port.now() + self.config.interval.max(limit);
             let control = codec::oversampling_bits(&self.config) | codec::FORCED;
             self.port.write(register::CTRL_MEAS, &[control]).await?;
-            // Not before the write: that may have waited for the bus.
+            // Read after the write, which may have waited for the bus.
             let begun = self.port.now();
             let [status, mode]: [u8; 2] = self.port.read(register::STATUS).await?;
             if status & codec::MEASURING != 0 || mode & codec::MODE != 0 {
                 return Ok(begun);
             }
+            // The check counts only if the conversion cannot have ended already.
             failed += usize::from(self.port.now().since(begun) < limit / 2);
             if failed == ATTEMPTS {
                 break;
@@ -190,7 +198,7 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
         Err(ChipError::NoSample)
     }
 
-    /// The raw result of the conversion that began at this instant.
+    /// The raw result of the conversion that started at this instant.
     async fn finish(&mut self, begun: Instant) -> Result<Reading, ChipError<R::Error>> {
         let wanted = (codec::oversampling_bits(&self.config), codec::filter_bits(&self.config));
         let limit = codec::conversion_limit(&self.config);
@@ -198,6 +206,7 @@ impl<R: Registers, T: Timebase> Bmp280<R, T> {
         loop {
             let looks = self.port.now();
             let reading = Reading::decode(&self.port.read(register::STATUS).await?);
+            // The settings are part of the burst, so a restart is detected at once.
             if (reading.oversampling_bits, reading.filter_bits) != wanted {
                 self.calibration = None;
                 return Err(ChipError::Restarted);

@@ -1,4 +1,4 @@
-//! The BMP280 driver against a chip of closures that converts when it is told to.
+//! Tests of the BMP280 driver on a chip made of closures that converts on command.
 
 use stampfly_bmp280::{Bmp280, Config};
 use stampfly_driver_core::blocking::block_on;
@@ -12,12 +12,12 @@ use std::rc::Rc;
 struct Chip {
     clock: Clock,
     registers: [u8; 256],
-    /// When the running conversion ends.
+    /// End of the conversion in progress.
     busy_until: Instant,
     conversions: u32,
     duration: u64,
     fault: Option<Fault>,
-    /// So many commands to convert arrive as sleep.
+    /// Number of conversion commands that arrive as a command to sleep.
     deaf: u32,
 }
 
@@ -30,7 +30,7 @@ impl Chip {
         for (pair, word) in registers[0x88..0xA0].chunks_mut(2).zip(words) {
             pair.copy_from_slice(&word.to_le_bytes());
         }
-        // The data sheet's example: 415 148 and 519 888.
+        // The example of the data sheet: 415 148 and 519 888.
         registers[0xF7..0xFD].copy_from_slice(&[0x65, 0x5A, 0xC0, 0x7E, 0xED, 0x00]);
         Self {
             clock: clock.clone(),
@@ -180,7 +180,7 @@ fn after_a_cancelled_call_the_next_one_waits_for_the_conversion_it_left_behind()
     cancel(baro.next());
     clock.stop(false);
     assert_eq!(chip.borrow().conversions, 2);
-    // The chip asserts that nothing is running when the third begins.
+    // The chip asserts that no conversion is in progress when the third one starts.
     let sample = block_on(baro.next()).expect("a sample");
     assert_eq!(chip.borrow().conversions, 3);
     assert!(clock.now().since(sample.at) < Duration::from_millis(8));
@@ -191,7 +191,7 @@ fn it_works_on_spi_too() {
     let clock = Clock::default();
     let chip = Rc::new(RefCell::new(Chip::new(&clock)));
     let shared = chip.clone();
-    // Seven bits of the address.
+    // The address has seven bits.
     let access = move |access: Access<'_>| {
         shared.borrow_mut().access(match access {
             Access::Read(register, into) => Access::Read(register | 0x80, into),

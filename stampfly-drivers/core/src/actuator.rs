@@ -1,4 +1,4 @@
-//! Motors and servos.
+//! Traits for motors and servos, and brushed motors on PWM channels.
 
 use crate::{ArmToken, Interlock};
 use core::error::Error;
@@ -7,13 +7,13 @@ use embedded_hal::pwm::SetDutyCycle;
 use stampfly_types::Duration;
 use stampfly_types::messages::{MotorOutput, ServoOutput};
 
-/// Motors that take a duty cycle.
+/// Motors that take a duty cycle, 0 to 1.
 ///
 /// # Contract
-/// * `armed: false` stops every motor, whatever the duties say.
-/// * On real motors `armed: true` counts after an `armed: false` only: see [`Interlock`].
-/// * A duty that is not finite counts as zero; others are clamped to 0..=1.
-/// * Returns within microseconds; called once per control period.
+/// * `armed: false` stops every motor, whatever the duties are.
+/// * On real motors `armed: true` takes effect only after an `armed: false`: see [`Interlock`].
+/// * A duty that is not finite counts as zero; other duties are clamped to 0..=1.
+/// * `write` returns within microseconds. The caller calls it once per control period.
 pub trait MotorOutputs {
     /// The driver's error.
     type Error: core::fmt::Debug;
@@ -21,15 +21,15 @@ pub trait MotorOutputs {
     /// Applies the duties.
     ///
     /// # Errors
-    /// When a motor could not be set. The others have been set nevertheless.
+    /// When a motor could not be set. The other motors have been set nevertheless.
     fn write(&mut self, output: &MotorOutput) -> Result<(), Self::Error>;
 }
 
-/// Servos of control surfaces.
+/// Servos of control surfaces, which take a deflection of −1 to 1.
 ///
 /// # Contract
 /// * A deflection that is not finite counts as zero; others are clamped to −1..=1.
-/// * Returns within microseconds; called once per control period.
+/// * `write` returns within microseconds. The caller calls it once per control period.
 pub trait ServoOutputs {
     /// The driver's error.
     type Error: core::fmt::Debug;
@@ -37,7 +37,7 @@ pub trait ServoOutputs {
     /// Moves the servos.
     ///
     /// # Errors
-    /// When a servo could not be told. The others have been told nevertheless.
+    /// When a servo could not be set. The other servos have been set nevertheless.
     fn write(&mut self, output: &ServoOutput) -> Result<(), Self::Error>;
 }
 
@@ -59,11 +59,11 @@ impl Error for MotorError {}
 
 /// Brushed motors behind transistors, one PWM channel each.
 ///
-/// They turn only after an output that was not armed ([`Interlock`]): a driver that is created in the middle of a
-/// flight leaves them still. They stop when this is dropped.
+/// The motors turn only after an output that was not armed ([`Interlock`]): a driver that is
+/// created in the middle of a flight leaves them off. Dropping the driver stops them.
 ///
-/// An output that does not come any more changes nothing: cutting off stale commands is the board's work, with
-/// [`stop`](Self::stop).
+/// The channels keep their last duty when outputs stop coming. Cutting off stale commands is the
+/// board's task, with [`stop`](Self::stop).
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -94,9 +94,9 @@ impl Error for MotorError {}
 pub struct PwmMotors<P: SetDutyCycle, const N: usize> {
     channels: [P; N],
     interlock: Interlock,
-    /// What the channels were last told.
+    /// Duties last written to the channels, 0 to 1.
     duties: [f32; N],
-    /// The most a duty rises from one output to the next.
+    /// Largest rise of a duty from one output to the next.
     rise: f32,
 }
 
@@ -108,25 +108,27 @@ impl<P: SetDutyCycle, const N: usize> PwmMotors<P, N> {
         motors
     }
 
-    /// Limits how fast a duty rises: by so much a second when outputs come with this period, and slower when they come
-    /// less often. A falling duty is never limited. A limit that is not positive keeps the motors still.
+    /// Limits the rise of a duty to `duty_per_second`, given outputs that come every `period`; with
+    /// a longer period the rise is slower. A falling duty is never limited. A limit that is zero,
+    /// negative or NaN keeps the motors off.
     #[must_use]
     pub fn with_slew_limit(mut self, duty_per_second: f32, period: Duration) -> Self {
-        // NaN gives zero.
+        // `f32::max` returns zero for NaN.
         self.rise = (duty_per_second * period.seconds()).max(0.0);
         self
     }
 
-    /// Stops every motor. The next armed output turns them again, from zero on.
+    /// Stops every motor. The next armed output turns them again, and the slew limit starts from
+    /// zero.
     pub fn stop(&mut self) {
         self.duties = [0.0; N];
         for channel in &mut self.channels {
-            // A channel that cannot be stopped has nobody left to tell; the board's own cut-off remains.
+            // Errors are ignored here; the board's hardware cut-off is the backstop.
             let _ = channel.set_duty_cycle_fully_off();
         }
     }
 
-    /// Stops every motor, and none turns until the vehicle has been disarmed.
+    /// Stops every motor and blocks all of them until an output that is not armed has been written.
     pub fn lock(&mut self) {
         self.interlock.lock();
         self.stop();
@@ -138,7 +140,7 @@ impl<P: SetDutyCycle, const N: usize> PwmMotors<P, N> {
     }
 }
 
-/// What a channel is to be told, now that motors may turn. The only way to a duty above zero.
+/// The next duty of a channel. Takes a token, so that no duty above zero exists without one.
 fn turn(_: &ArmToken<'_>, wanted: f32, before: f32, rise: f32) -> f32 {
     let wanted = if wanted.is_finite() { wanted.clamp(0.0, 1.0) } else { 0.0 };
     wanted.min(before + rise)
@@ -149,11 +151,13 @@ impl<P: SetDutyCycle, const N: usize> MotorOutputs for PwmMotors<P, N> {
 
     fn write(&mut self, output: &MotorOutput) -> Result<(), MotorError> {
         let mut result = Ok(());
+        // One token per output: without it every duty below is zero.
         let token = self.interlock.token(output);
         let channels = self.channels.iter_mut().zip(&mut self.duties).enumerate();
         for ((index, (channel, duty)), wanted) in channels.zip(output.duty) {
             *duty = token.as_ref().map_or(0.0, |token| turn(token, wanted, *duty, self.rise));
             let max = channel.max_duty_cycle();
+            // Rounds to the nearest count; the cast saturates.
             let counts = (*duty * f32::from(max) + 0.5) as u16;
             if channel.set_duty_cycle(counts.min(max)).is_err() && result.is_ok() {
                 result = Err(MotorError { channel: index });

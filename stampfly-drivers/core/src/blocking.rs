@@ -1,11 +1,12 @@
-//! Drivers on a program that knows no `async`.
+//! Runs the asynchronous drivers in a program without `async`.
 //!
-//! A driver is written once, asynchronously. On a blocking bus every one of its waits is over the moment it begins,
-//! so polling it to the end is a plain function call: [`Blocking`] makes an asynchronous bus or delay of a blocking
-//! one, [`BlockingClock`] a [`Timebase`], and [`block_on`] calls.
+//! Each driver is written once, asynchronously. On a blocking bus a transfer has finished when its
+//! future is polled for the first time, so polling the driver's future to its end is an ordinary
+//! function call. [`Blocking`] turns a blocking bus or delay into an asynchronous one,
+//! [`BlockingClock`] makes a [`Timebase`], and [`block_on`] makes the call.
 //!
-//! Not for a program that has an executor: while a blocking bus transfers, nothing else runs. And a blocking bus
-//! that hangs cannot be given up by the driver; its own time-out has to end it.
+//! Not for a program with an executor: nothing else runs while a blocking bus transfers. A driver
+//! cannot give up a blocking transfer that hangs; the bus needs a time-out of its own.
 
 use crate::Timebase;
 use core::future::Future;
@@ -15,7 +16,7 @@ use embedded_hal::{delay, i2c, spi};
 use embedded_hal_async as asynchronous;
 use stampfly_types::Instant;
 
-/// Runs a future to its end on this thread, spinning while it waits.
+/// Runs a future to its end on this thread, and spins while it is pending.
 ///
 /// ```
 /// use stampfly_driver_core::blocking::block_on;
@@ -32,7 +33,8 @@ pub fn block_on<T>(future: impl Future<Output = T>) -> T {
     }
 }
 
-/// A blocking bus or delay as an asynchronous one.
+/// Wraps a blocking bus or delay as an asynchronous one. Every operation completes at its first
+/// poll.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -88,7 +90,7 @@ impl<D: delay::DelayNs> asynchronous::delay::DelayNs for Blocking<D> {
     }
 }
 
-/// A [`Timebase`] of a blocking delay and a function that tells the time since power-on.
+/// A [`Timebase`] made of a blocking delay and a function that returns the time since power-on.
 ///
 /// ```
 /// # struct Delay;
@@ -105,7 +107,7 @@ pub struct BlockingClock<D, F> {
 }
 
 impl<D, F: Fn() -> Instant> BlockingClock<D, F> {
-    /// A clock of its two halves.
+    /// Combines a delay with a function that returns the time since power-on.
     pub const fn new(delay: D, now: F) -> Self {
         Self { delay: Blocking(delay), now }
     }

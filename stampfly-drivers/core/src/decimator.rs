@@ -1,13 +1,15 @@
-//! From four samples to one without folding, for sensors that sample faster than the vehicle controls.
+//! Decimates an inertial sensor's samples by four with a low-pass filter against aliasing.
 //!
-//! Two moving averages of four in a row, that is the weights 1 2 3 4 3 2 1, computed exactly in integers. Its double
-//! zeros lie at one and two times the output rate, where the folds to zero would come from: at 1600 Hz in and 400 Hz
-//! out a rotor at hover (478 Hz) is damped by 30 dB. It is symmetric, so every frequency is delayed by the same three
-//! input samples: the output is valid for the first sample of the newest group.
+//! The filter is two moving averages of four in a row, which gives the weights 1 2 3 4 3 2 1,
+//! computed exactly in integers. It has double zeros at one and two times the output rate, the
+//! frequencies that alias to zero: with 1600 Hz in and 400 Hz out it damps a rotor at hover
+//! (478 Hz) by 30 dB. The weights are symmetric, so every frequency is delayed by three input
+//! samples: the output is valid for the first sample of the newest group.
 //!
-//! Not for ratios other than four, and no substitute for a notch: what lies below half the output rate passes.
+//! Not for ratios other than four. It does not replace a notch filter: frequencies below half the
+//! output rate pass.
 
-/// The filter for six channels.
+/// The filter for six channels: three of acceleration, three of angular rate.
 ///
 /// ```
 /// use stampfly_driver_core::Decimator;
@@ -17,17 +19,20 @@
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Decimator {
-    /// What the previous group adds to the next output.
+    /// The previous group's share of the next output; `None` before the first group.
     carry: Option<[i32; 6]>,
 }
 
 impl Decimator {
-    /// The sum of the weights: outputs are in this fraction of an input count.
+    /// Sum of the weights. An output divided by it is in counts of the input.
     pub const GAIN: i32 = 16;
 
-    /// Takes four samples and gives one in sixteenths of a count; the first group only fills the filter.
+    /// Takes four samples and returns one, in sixteenths of an input count. The first group fills
+    /// the filter and returns `None`.
     #[must_use]
     pub fn push(&mut self, group: &[[i16; 6]; 4]) -> Option<[i32; 6]> {
+        // The seven weights span two groups: the samples of this group have the falling weights
+        // 4 3 2 1 in this output and the rising weights 0 1 2 3 in the next one.
         let before = self.carry.replace(weighted(group, [0, 1, 2, 3]));
         let mut sum = weighted(group, [4, 3, 2, 1]);
         for (sum, before) in sum.iter_mut().zip(before?) {

@@ -1,18 +1,19 @@
-//! Embassy's clock as a [`Timebase`], behind the feature `embassy-time`.
+//! [`EmbassyClock`]: Embassy's clock as a [`Timebase`], behind the feature `embassy-time`.
 //!
-//! For a program with Embassy's executor: a wait costs no processor. Not before the clock's driver has been started, which
-//! `embassy_*::init` of the chip's crate does.
+//! For a program on Embassy's executor, where a wait frees the processor. The time driver must have
+//! been started first, which `embassy_*::init` of the microcontroller's crate does.
 
 use crate::Timebase;
 use embassy_time::{Duration, Timer};
 use embedded_hal_async::delay::DelayNs;
 use stampfly_types::Instant;
 
-/// The program's one clock, as often as drivers want it.
+/// The time of Embassy's global time driver. Every driver can have its own copy.
 ///
-/// A wait is never shorter than asked: the tick that is running does not count. With ticks of 1/32768 s it may be 61 µs longer, which a chip
-/// on I2C does not mind; where samples are wanted at 400 Hz, let the clock have ticks of a microsecond (feature `tick-hz-1_000_000` of
-/// `embassy-time`).
+/// A wait is never shorter than requested: it is extended by one tick, because the current tick is
+/// already running. With ticks of 1/32768 s a wait can be 61 µs longer than requested, which does
+/// not matter to a chip on I2C. For samples at 400 Hz use ticks of a microsecond (feature
+/// `tick-hz-1_000_000` of `embassy-time`).
 ///
 /// ```no_run
 /// use stampfly_driver_core::{EmbassyClock, Timebase};
@@ -21,7 +22,7 @@ use stampfly_types::Instant;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EmbassyClock;
 
-/// The tick that is running, of which nobody knows how much is left.
+/// Compensates for the current tick, an unknown part of which has already passed.
 const RUNNING: Duration = Duration::from_ticks(1);
 
 impl DelayNs for EmbassyClock {

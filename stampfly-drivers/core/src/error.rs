@@ -1,7 +1,7 @@
-//! What can go wrong with a sensor, in terms a program can act on.
+//! Kinds of sensor errors that a program can act on.
 //!
-//! Every driver has an error type of its own that says more; [`SensorError::kind`] is the part that is the same
-//! for all of them, as in `embedded-hal`.
+//! Every driver has its own error type with details. [`SensorError::kind`] reduces it to what all
+//! drivers have in common, like `kind` in `embedded-hal`.
 
 use core::convert::Infallible;
 use core::error::Error;
@@ -12,9 +12,9 @@ use core::fmt::{self, Debug, Display};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SensorErrorKind {
-    /// The bus refused or garbled the transfer.
+    /// The bus reported an error in a transfer.
     Bus,
-    /// No new sample within the time the sensor promises.
+    /// No new sample within the time the sensor specifies, or a transfer that took too long.
     Timeout,
     /// Another chip answered.
     Identification,
@@ -22,13 +22,15 @@ pub enum SensorErrorKind {
     Configuration,
     /// The chip's self test failed.
     SelfTest,
-    /// The chip answered with data that cannot be.
+    /// The chip returned invalid data.
     Data,
-    /// The chip lost its settings; the next call sets it up again.
+    /// The chip lost its configuration; the next call sets it up again.
     Restarted,
-    /// No chip answered: the data line was as one that nobody drives, all ones or all zeros.
+    /// No chip answered: the data line read all ones or all zeros, as it does when it is not
+    /// driven.
     Absent,
-    /// What the chip measured could not be right; it measures another way from the next call on.
+    /// The measurement was implausible; the driver uses another measuring mode from the next call
+    /// on.
     Implausible,
     /// None of the above.
     Other,
@@ -55,7 +57,7 @@ impl Error for SensorErrorKind {}
 
 /// An error of a sensor driver.
 pub trait SensorError: Debug {
-    /// The part of the error that is the same for every driver.
+    /// The kind of this error, common to all drivers.
     fn kind(&self) -> SensorErrorKind;
 }
 

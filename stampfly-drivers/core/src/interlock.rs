@@ -1,15 +1,18 @@
-//! No motor turns without a decision to arm.
+//! Keeps the motors off until a disarmed vehicle has been armed.
 //!
-//! An output that says "armed" is not such a decision: it may be the first thing a driver hears, after a restart in the
-//! middle of a flight or from a program that never disarmed. The decision is the *edge*, an armed output after one that
-//! was not, and only the [`Interlock`] makes an [`ArmToken`] of it. Whoever implements
-//! [`MotorOutputs`](crate::MotorOutputs) keeps an interlock, and lets the function that sets duty cycles take a token.
-//! Not the arming logic itself (who may arm, and when), which is decided long before.
+//! An output with `armed: true` alone does not show that the vehicle has just been armed: it may be
+//! the first output after a restart in flight, or come from a program that never disarms. Arming is
+//! the *edge*: an armed output after one that was not armed. Only [`Interlock`] turns that edge
+//! into an [`ArmToken`]. An implementation of [`MotorOutputs`](crate::MotorOutputs) keeps an
+//! interlock, and its function that computes duty cycles takes a token.
+//!
+//! Not the arming logic itself, which checks who may arm and when; that is part of the mode
+//! machine.
 
 use core::marker::PhantomData;
 use stampfly_types::messages::MotorOutput;
 
-/// Watches the outputs and gives tokens.
+/// Checks each output and issues tokens.
 ///
 /// ```
 /// use stampfly_driver_core::Interlock;
@@ -24,20 +27,21 @@ use stampfly_types::messages::MotorOutput;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Interlock {
-    /// A disarmed output has been seen.
+    /// An output that was not armed has been seen since the start or since
+    /// [`lock`](Interlock::lock).
     open: bool,
 }
 
-/// The permission to turn motors with this one output.
+/// Permission to turn the motors for one output.
 ///
-/// It borrows from the interlock, so it cannot be kept for the next output.
+/// It borrows the interlock, so it cannot be kept for the next output.
 #[derive(Debug)]
 pub struct ArmToken<'i> {
     decision: PhantomData<&'i mut Interlock>,
 }
 
 impl Interlock {
-    /// A token when the vehicle is armed and was seen disarmed before.
+    /// A token when this output is armed and an earlier one was not.
     pub const fn token(&mut self, output: &MotorOutput) -> Option<ArmToken<'_>> {
         if !output.armed {
             self.open = true;
@@ -46,7 +50,7 @@ impl Interlock {
         if self.open { Some(ArmToken { decision: PhantomData }) } else { None }
     }
 
-    /// Forgets: no token until the vehicle has been disarmed again.
+    /// Withholds tokens until an output that is not armed has been seen.
     pub const fn lock(&mut self) {
         self.open = false;
     }

@@ -1,10 +1,10 @@
-//! Where commands come from: radios, programs, a button.
+//! Sources of commands: radio links, programs, a button.
 
 use crate::{Sample, SensorError};
 use embedded_hal::digital::InputPin;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
-/// One authentic command.
+/// One authenticated command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
@@ -16,26 +16,27 @@ pub enum Command {
 
 /// A link that delivers commands.
 ///
-/// The link has already checked length, tag, session and counter; what arrives here is authentic, finite and in
-/// range. Anything else it counts and drops.
+/// The implementation has already checked length, tag, session and counter. Every command it
+/// returns is authentic, finite and in range; it counts and drops all others.
 pub trait CommandLink {
     /// The link's error.
     type Error: SensorError;
 
-    /// Waits for the next command. May be dropped before it resolves without losing a command.
+    /// Waits for the next command. Dropping the future before it resolves loses no command.
     ///
     /// # Errors
-    /// When the link itself fails; a rejected frame is not an error.
+    /// When the link itself fails. A rejected frame is not an error.
     async fn next(&mut self) -> Result<Sample<Command>, Self::Error>;
 }
 
-/// A contact that is closed or open.
+/// A contact that is either closed or open.
 pub trait Button {
-    /// Is it pressed right now? Not debounced: that is the button component's work.
+    /// Whether the button is pressed now. Not debounced; the component that detects gestures does
+    /// that.
     fn is_pressed(&mut self) -> bool;
 }
 
-/// A button between a pin and ground (active low, as on the StampFly's GPIO 0).
+/// A button between a pin and ground: active low, as on GPIO 0 of the StampFly.
 ///
 /// A pin that cannot be read counts as not pressed.
 pub struct PinButton<P>(pub P);

@@ -1,41 +1,45 @@
-//! Frees an I2C bus on which a device holds the data line.
+//! Frees an I2C bus whose data line a device holds low.
 //!
-//! A device that was interrupted while it sent a zero (a reset of the processor, a glitch on the clock) waits for clocks
-//! that nobody sends, and every transfer fails until it gets them. Whoever owns the bus calls [`recover_i2c`] when
-//! every device on it fails, with the pins taken from the peripheral and configured as open drain, and gives them back
-//! afterwards. Not for drivers, which share the bus, and no help against a device that holds the *clock* line: that
-//! one needs its reset pin or its power.
+//! A device that was interrupted while it sent a zero (by a reset of the processor or a glitch on
+//! the clock line) waits for further clocks, and every transfer fails until it gets them. When
+//! every device on the bus fails, the owner of the bus takes the pins from the peripheral,
+//! configures them as open drain, calls [`recover_i2c`] and returns the pins to the peripheral.
+//!
+//! Not for drivers, because they share the bus. It does not help against a device that holds the
+//! *clock* line low: that device needs a reset or a power cycle.
 
 use core::fmt;
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_async::delay::DelayNs;
 
-/// Half a clock at 100 kHz, µs.
+/// Half a clock period at 100 kHz, µs.
 const HALF_CLOCK: u32 = 5;
-/// A device that reads nine bits has read its acknowledgement, which is missing, and lets go.
+/// Eight data bits and the acknowledge bit, which the host leaves high: the device then stops
+/// sending.
 const CLOCKS: u8 = 9;
-/// Half clocks that the clock line may be stretched in all: 500 µs.
+/// Total number of half clocks for which devices may stretch the clock: 500 µs.
 const PATIENCE: u8 = 100;
 
-/// What was wrong.
+/// State of the bus before a successful recovery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Recovery {
-    /// Nothing: the data line was free. A STOP was sent nevertheless.
+    /// The data line was free. A STOP was sent nevertheless.
     WasFree,
-    /// A device held the data line, and let go after this many clocks.
+    /// A device held the data line low and released it after `clocks` clocks.
     Freed {
         /// 1 to 9.
         clocks: u8,
     },
 }
 
-/// Why the bus is not free.
+/// Reason why the bus is not free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecoveryError {
-    /// The clock line stays low: a short circuit, no supply, or a device that stretches the clock for ever.
+    /// The clock line stays low: a short circuit, no supply, or a device that stretches the clock
+    /// without end.
     ClockStuck,
     /// The data line stays low after nine clocks.
     DataStuck,
@@ -55,13 +59,15 @@ impl fmt::Display for RecoveryError {
 
 impl core::error::Error for RecoveryError {}
 
-/// Clocks the bus until nobody holds the data line, then sends a STOP (UM10204 §3.1.16). At most 1 ms, by this delay's
-/// clock.
+/// Sends clocks until the data line is free, then a STOP (UM10204 §3.1.16). Takes at most 1 ms,
+/// measured by `delay`.
 ///
-/// Both pins are open drain: high lets go of the line, and reading tells its level.
+/// Both pins are open drain: setting a pin high releases its line, and reading it returns the
+/// line's level.
 ///
 /// # Errors
-/// When the bus is not free afterwards; both lines are let go nevertheless. Whoever is told so may call again.
+/// When the bus is not free afterwards. Both lines are released nevertheless, and the caller may
+/// try again.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -92,6 +98,7 @@ where
 {
     let mut lines = Lines { scl, sda, delay, patience: PATIENCE };
     let outcome = lines.recover().await;
+    // Both lines are released in any case, so that the peripheral can take over.
     let released = (lines.scl.set_high(), lines.sda.set_high());
     if released.0.is_err() || released.1.is_err() { outcome.and(Err(RecoveryError::Pin)) } else { outcome }
 }
@@ -112,7 +119,8 @@ impl<C: InputPin + OutputPin, D: InputPin + OutputPin, W: DelayNs> Lines<'_, C, 
                 self.clock_low().await?;
                 self.clock_high().await?;
             }
-            // A one of a device that goes on sending looks like a free line, but the STOP does not get through.
+            // A device in the middle of a byte may be sending a one, which looks like a free line.
+            // The STOP fails then, and the loop sends the next clock.
             if self.is_free()? && self.stop().await? {
                 return Ok(if clocks == 0 { Recovery::WasFree } else { Recovery::Freed { clocks } });
             }
@@ -120,7 +128,8 @@ impl<C: InputPin + OutputPin, D: InputPin + OutputPin, W: DelayNs> Lines<'_, C, 
         Err(RecoveryError::DataStuck)
     }
 
-    /// Data rises while the clock is high; tells whether it did.
+    /// Sends a STOP: a rising data line while the clock is high. Returns whether the data line
+    /// rose.
     async fn stop(&mut self) -> Result<bool, RecoveryError> {
         self.clock_low().await?;
         self.sda.set_low().map_err(|_| RecoveryError::Pin)?;
@@ -143,6 +152,7 @@ impl<C: InputPin + OutputPin, D: InputPin + OutputPin, W: DelayNs> Lines<'_, C, 
     async fn clock_high(&mut self) -> Result<(), RecoveryError> {
         self.scl.set_high().map_err(|_| RecoveryError::Pin)?;
         self.delay.delay_us(HALF_CLOCK).await;
+        // A device may stretch the clock; `patience` bounds the total over all clocks.
         while self.scl.is_low().map_err(|_| RecoveryError::Pin)? {
             self.patience = self.patience.checked_sub(1).ok_or(RecoveryError::ClockStuck)?;
             self.delay.delay_us(HALF_CLOCK).await;

@@ -1,4 +1,4 @@
-//! One trait per kind of sensor.
+//! One trait for each kind of sensor.
 
 use crate::SensorError;
 use stampfly_types::messages::{
@@ -6,7 +6,8 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, Instant};
 
-/// A measurement and the instant it is valid for. How good it is, is part of the measurement: `valid`, `sigma`, `quality`.
+/// A measurement and the instant it is valid for. Its quality is part of the measurement: `valid`,
+/// `sigma`, `quality`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample<T> {
@@ -17,7 +18,7 @@ pub struct Sample<T> {
 }
 
 impl<T> Sample<T> {
-    /// How old the data is at `now`; zero when it is stamped in the future.
+    /// Age of the data at `now`; zero when its time stamp is in the future.
     ///
     /// ```
     /// use stampfly_driver_core::Sample;
@@ -38,10 +39,11 @@ macro_rules! sensor_trait {
             /// The driver's error.
             type Error: SensorError;
 
-            /// Waits for the next sample. See the crate's contract of sensor traits.
+            /// Waits for the next sample. The front page of the crate states the contract of sensor
+            /// traits.
             ///
             /// # Errors
-            /// When this sample is lost; the next call tries again.
+            /// When this sample is lost. The next call tries again.
             async fn next(&mut self) -> Result<Sample<$Data>, Self::Error>;
         }
 
@@ -55,9 +57,9 @@ macro_rules! sensor_trait {
 }
 
 sensor_trait! {
-    /// A six-axis inertial measurement unit, at the vehicle's control rate.
+    /// A six-axis inertial measurement unit that delivers samples at the control rate.
     ///
-    /// A chip that samples faster is decimated by its driver with a filter, never by skipping.
+    /// A driver whose chip samples faster decimates with a filter, not by skipping samples.
     Imu, ImuData
 }
 sensor_trait! {
@@ -71,16 +73,18 @@ sensor_trait! {
 sensor_trait! {
     /// A range finder along a fixed beam.
     ///
-    /// A range that the chip does not vouch for is a sample with `valid: false`, not an error: "nothing in the
-    /// beam" is an answer.
+    /// A distance that the driver considers invalid is a sample with `valid: false`, not an error:
+    /// "no target in the beam" is a valid answer.
     RangeFinder, TofData
 }
 sensor_trait! {
-    /// An optical flow sensor. The angles are the sum since the previous sample; none is lost between two calls.
+    /// An optical flow sensor. The angles are the sum since the previous sample; no motion between
+    /// two calls is lost.
     OpticalFlow, FlowData
 }
 sensor_trait! {
-    /// A system of cameras in the room. Its samples are stamped when they were seen and arrive tens of milliseconds later.
+    /// A motion capture system. A sample is stamped with the instant of exposure and arrives tens
+    /// of milliseconds later.
     MotionCapture, ExternalPose
 }
 sensor_trait! {
@@ -88,11 +92,12 @@ sensor_trait! {
     PowerMonitor, PowerData
 }
 sensor_trait! {
-    /// A satellite receiver. A sample is stamped with the instant of its fix and arrives 50 to 300 ms later. Without satellites samples go
-    /// on, with [`GnssFix::None`](stampfly_types::messages::GnssFix::None).
+    /// A satellite receiver (GNSS). A sample is stamped with the instant of its fix and arrives 50
+    /// to 300 ms later. Without satellites the receiver still delivers samples, with
+    /// [`GnssFix::None`](stampfly_types::messages::GnssFix::None).
     Gnss, GnssData
 }
 sensor_trait! {
-    /// A pitot tube with its pressure sensor, zeroed.
+    /// A pitot tube with its pressure sensor. The offset of the sensor has been removed.
     Airspeed, AirspeedData
 }

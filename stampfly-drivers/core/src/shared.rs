@@ -1,15 +1,19 @@
-//! One I2C bus for several drivers: a turn for each, and a cure when a device holds the data line.
+//! Shares one I2C bus between several drivers, in round-robin order, with recovery of a stuck bus.
 //!
-//! The drivers run as tasks of one executor. Each has a [`Share`] of the bus and takes its turn for one transfer; the
-//! next turn goes to the next share in a circle that wants one. So nobody waits for more than one transfer of every
-//! other, however often they ask. Whoever holds the turn when a transfer fails also frees the bus, so a device that
-//! hangs costs the others a millisecond and not the flight. Not across executors: it is `Cell`s.
+//! The drivers run as tasks of one executor. Each has a [`Share`] of the bus and holds the bus for
+//! one transfer at a time; the next share that waits, in circular order, is served next. A driver
+//! therefore waits for at most one transfer of every other driver, however often those request the
+//! bus. The share whose transfer fails also recovers the bus, so a device that hangs delays the
+//! other drivers by about a millisecond.
+//!
+//! Not across executors or cores: the state is in `Cell`s.
 //!
 //! # Guarantees
-//! * Two transfers never overlap, and a transfer that was given up half way ends before the next one begins.
-//! * A share that wants the bus waits for at most one transfer, and one recovery, of every other share.
-//! * A transfer that fails otherwise than by a missing acknowledge is followed by a recovery before anybody else's turn;
-//!   one that was given up, by a recovery before the next transfer.
+//! * Transfers never overlap. A transfer that was dropped half way ends before the next one begins.
+//! * A share waits for at most one transfer, and one recovery, of every other share.
+//! * After a transfer that fails with an error other than a missing acknowledge, the bus is
+//!   recovered before the next share is served. After a transfer that was dropped, it is recovered
+//!   before the next transfer.
 
 use crate::recovery::{Recovery, RecoveryError};
 use core::cell::Cell;
@@ -17,17 +21,17 @@ use core::future::poll_fn;
 use core::task::{Context, Poll, Waker};
 use embedded_hal_async::i2c::{Error, ErrorKind, ErrorType, I2c, Operation};
 
-/// A bus whose owner can free it: a peripheral that can be reset, or whose pins can be clocked by hand with
+/// A bus that its owner can free: by resetting the peripheral, or by clocking the pins with
 /// [`recover_i2c`](crate::recover_i2c).
 pub trait RecoverableI2c: I2c {
-    /// Frees the data line, within about a millisecond.
+    /// Frees the data line within about a millisecond.
     ///
     /// # Errors
     /// When the bus is not free afterwards.
     async fn recover(&mut self) -> Result<Recovery, RecoveryError>;
 }
 
-/// The bus, and whose turn it is among `N` drivers.
+/// The bus, and the queue of its `N` shares.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -57,20 +61,20 @@ pub trait RecoverableI2c: I2c {
 /// # Ok::<(), Infallible>(())
 /// ```
 pub struct SharedI2c<B, const N: usize> {
-    /// Away while somebody transfers.
+    /// `None` while a share transfers.
     bus: Cell<Option<B>>,
-    /// Who waits, and how to tell.
+    /// Wakers of the shares that wait.
     waiting: [Cell<Option<Waker>>; N],
-    /// The share whose turn it is next, when somebody has been told.
+    /// The share that has been woken and is served next.
     called: Cell<Option<usize>>,
-    /// A transfer was given up.
+    /// A transfer was dropped before it ended, so the bus may be stuck.
     suspect: Cell<bool>,
     recoveries: Cell<u32>,
     failures: Cell<u32>,
 }
 
 impl<B: RecoverableI2c, const N: usize> SharedI2c<B, N> {
-    /// Owns the bus.
+    /// Takes ownership of the bus.
     pub const fn new(bus: B) -> Self {
         Self {
             bus: Cell::new(Some(bus)),
@@ -82,18 +86,18 @@ impl<B: RecoverableI2c, const N: usize> SharedI2c<B, N> {
         }
     }
 
-    /// A share for each driver, and the counters.
+    /// Returns one share for each driver, and a reference for reading the counters.
     pub fn split(&mut self) -> ([Share<'_, B, N>; N], &Self) {
         let bus = &*self;
         (core::array::from_fn(|index| Share { bus, index }), bus)
     }
 
-    /// How often a device was found to hold the data line and let go, modulo 2³².
+    /// Number of recoveries in which a device held the data line and released it, modulo 2³².
     pub fn recoveries(&self) -> u32 {
         self.recoveries.get()
     }
 
-    /// How often the bus was not free after a recovery, modulo 2³².
+    /// Number of recoveries after which the bus was not free, modulo 2³².
     pub fn failures(&self) -> u32 {
         self.failures.get()
     }
@@ -107,8 +111,9 @@ impl<B: RecoverableI2c, const N: usize> SharedI2c<B, N> {
         }
     }
 
-    /// Takes the turn, or asks to be called.
+    /// Takes the bus when it is free for this share, or queues the share's waker.
     fn poll_turn(&self, index: usize, context: &mut Context<'_>) -> Poll<B> {
+        // A share that was woken is served before all others, even if it has not been polled yet.
         if self.called.get().is_none_or(|called| called == index)
             && let Some(bus) = self.bus.take()
         {
@@ -121,7 +126,7 @@ impl<B: RecoverableI2c, const N: usize> SharedI2c<B, N> {
         Poll::Pending
     }
 
-    /// Calls the next share in the circle that waits.
+    /// Wakes the next share in circular order that waits.
     fn call_next(&self, after: usize) {
         self.called.set(None);
         for step in 1..=N {
@@ -149,7 +154,7 @@ pub struct Share<'b, B, const N: usize> {
     index: usize,
 }
 
-/// Leaves the queue when the wait is given up.
+/// Removes the share from the queue when its wait is dropped.
 struct Wait<'a, B: RecoverableI2c, const N: usize> {
     bus: &'a SharedI2c<B, N>,
     index: usize,
@@ -160,13 +165,14 @@ impl<B: RecoverableI2c, const N: usize> Drop for Wait<'_, B, N> {
         if let Some(place) = self.bus.waiting.get(self.index) {
             place.set(None);
         }
+        // The turn must not be lost with the future that was woken for it.
         if self.bus.called.get() == Some(self.index) {
             self.bus.call_next(self.index);
         }
     }
 }
 
-/// Gives the bus back, and the turn on, however the transfer ends.
+/// Returns the bus and wakes the next share, whether the transfer ended or was dropped.
 struct Turn<'a, B: RecoverableI2c, const N: usize> {
     shared: &'a SharedI2c<B, N>,
     index: usize,
@@ -194,13 +200,16 @@ impl<B: RecoverableI2c, const N: usize> I2c for Share<'_, B, N> {
         let wait = Wait { bus: shared, index };
         let bus = poll_fn(|context| shared.poll_turn(index, context)).await;
         drop(wait);
+        // From here on `Turn` returns the bus, also when this future is dropped.
         let mut turn = Turn { shared, index, bus: Some(bus), finished: false };
-        // Always there; without it there would be nothing to wait for.
+        // Always `Some`: it is taken only in `drop`. The alternative must not panic, so it waits.
         let Some(bus) = &mut turn.bus else { core::future::pending().await };
+        // The transfer before this one was dropped half way: free the bus before using it.
         if shared.suspect.get() {
             shared.recover(bus).await;
         }
         let outcome = bus.transaction(address, operations).await;
+        // A missing acknowledge is an answer of the bus, not a fault: the device is absent or busy.
         if outcome.as_ref().is_err_and(|error| !matches!(error.kind(), ErrorKind::NoAcknowledge(_))) {
             shared.recover(bus).await;
         }
@@ -220,7 +229,7 @@ mod tests {
     use std::task::Wake;
     use std::vec::Vec;
 
-    /// A bus whose transfers end at the second look, and fail while it is stuck.
+    /// A bus whose transfers end at the second poll, and fail while it is stuck.
     #[derive(Clone, Default)]
     struct Wire(Rc<State>);
 

@@ -1,20 +1,27 @@
-//! Two devices on one SPI bus without a lock: one leads, the other fits in between.
+//! Shares one SPI bus between two devices without a lock: a *lead* with a fixed rhythm and a
+//! *guest*.
 //!
-//! With a lock the inertial sensor waits whenever the flow sensor happens to transfer, and its sample is late by a time
-//! that depends on chance. Here the *lead* has a rhythm and never asks; the *guest* transfers only in the pause after
-//! the lead's transfers, and only when it will be over before the lead is due again. Use it where one device has to be
-//! on time and its transfers are short against its period. Not for two devices that both have to, not for transfers
-//! longer than the pause, and not across executors: it is `Cell`s, so both tasks run on one.
+//! With a lock, the inertial sensor waits whenever the flow sensor happens to transfer, and its
+//! samples are delayed by a random time. Here the lead transfers at any time. The guest transfers
+//! only in the pause after the lead's transfers, and only when its own transfer ends before the
+//! lead is due again. Use it where one device has to be on time and its transfers are short
+//! compared with its period.
+//!
+//! Not for two devices that both have to be on time, and not for transfers longer than the pause.
+//! Not across executors: the state is in `Cell`s, so both tasks run on one executor.
 //!
 //! # Guarantees
-//! * Two transfers never overlap, whatever the devices do.
-//! * A lead that keeps its rhythm (a burst of transfers begins no earlier than a period less the guard after the one
-//!   before, and within a burst no pause is longer than [`Rhythm::settle`]) never waits for the guest.
-//! * One that does not waits for at most the guest's longest transfer; [`Slots::delays`] counts how often.
-//! * A guest's transfer that takes longer than it promised is given up at that time ([`SlotError::TooLong`]).
-//! * A guest whose lead transfers in its rhythm begins within one period and the lead's burst.
-//! * A guest whose lead is silent for two periods goes on by itself: a dead inertial sensor does not blind the flow
-//!   sensor.
+//! * Transfers never overlap, whatever the devices do.
+//! * A lead that keeps its rhythm never waits for the guest. It keeps its rhythm when a burst of
+//!   transfers begins no earlier than a period less the guard after the previous burst, and no
+//!   pause within a burst is longer than [`Rhythm::settle`].
+//! * A lead that does not keep it waits for at most the guest's longest transfer; [`Slots::delays`]
+//!   counts these waits.
+//! * A transfer of the guest that takes longer than its declared maximum is given up at that time
+//!   ([`SlotError::TooLong`]).
+//! * While the lead keeps its rhythm, the guest begins within one period and the lead's burst.
+//! * When the lead has been silent for two periods, the guest transfers without it: a failed
+//!   inertial sensor does not disable the flow sensor.
 //!
 //! ```
 //! # use core::convert::Infallible;
@@ -55,20 +62,22 @@ use core::task::{Poll, Waker};
 use embedded_hal_async::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use stampfly_types::{Duration, Instant};
 
-/// When the lead transfers.
+/// Timing of the lead's transfers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rhythm {
-    /// From the beginning of one burst of the lead's transfers to that of the next.
+    /// Time from the beginning of one burst of the lead's transfers to the beginning of the next.
     pub period: Duration,
-    /// How much earlier than that the next may begin: the lead's clock is not ours, and its task may wake up late.
+    /// How much earlier than `period` the next burst may begin: the lead's clock differs from this
+    /// one, and its task may wake up late.
     pub guard: Duration,
-    /// The longest pause between two transfers of one burst.
+    /// Longest pause between two transfers of one burst.
     pub settle: Duration,
 }
 
 impl Rhythm {
-    /// The BMI270's driver: a status and a FIFO read every 2.5 ms of a clock that may be off by 3 per cent.
+    /// Rhythm of the BMI270 driver: a status read and a FIFO read every 2.5 ms of the chip's clock,
+    /// which may be off by 3 %.
     pub const HZ_400: Self = Self {
         period: Duration::from_micros(2_500),
         guard: Duration::from_micros(250),
@@ -80,43 +89,43 @@ impl Rhythm {
 pub struct Slots<T> {
     clock: T,
     rhythm: Rhythm,
-    /// The lead transfers right now.
+    /// The lead holds or awaits the bus.
     lead: Cell<bool>,
-    /// The guest transfers right now.
+    /// The guest transfers.
     guest: Cell<bool>,
-    /// Beginning of the lead's last burst.
+    /// Start of the lead's latest burst.
     begun: Cell<Instant>,
-    /// End of the lead's last transfer.
+    /// End of the lead's latest transfer.
     ended: Cell<Instant>,
-    /// Transfers of the lead that ended.
+    /// Number of transfers of the lead that have ended, modulo 2³².
     transfers: Cell<u32>,
-    /// Transfers of the lead that had to wait.
+    /// Number of transfers of the lead that had to wait, modulo 2³².
     delays: Cell<u32>,
-    /// Who waits for the other's end. There is one of each.
+    /// Waker of the device that waits for the other one's transfer to end. Each side has one task.
     waiting_lead: Cell<Option<Waker>>,
     waiting_guest: Cell<Option<Waker>>,
 }
 
-/// The lead's device.
+/// The lead's SPI device.
 pub struct Lead<'s, D, T> {
     slots: &'s Slots<T>,
     device: D,
 }
 
-/// The guest's device.
+/// The guest's SPI device.
 pub struct Guest<'s, D, T> {
     slots: &'s Slots<T>,
     device: D,
     longest: Duration,
 }
 
-/// Why the guest's transfer failed.
+/// Reason why a transfer of the guest failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotError<E> {
-    /// The device says so.
+    /// The SPI device reported an error.
     Device(E),
-    /// It took longer than promised, and the lead must not wait.
+    /// The transfer took longer than its declared maximum and was given up.
     TooLong,
 }
 
@@ -140,18 +149,18 @@ impl<E: Debug> Display for SlotError<E> {
 
 impl<E: Debug> core::error::Error for SlotError<E> {}
 
-/// What a guest that wants to transfer has to do.
+/// Next action of a guest that has a transfer to make.
 enum Opening {
-    /// Begin.
+    /// Transfer now.
     Now,
-    /// Ask again at this instant.
+    /// Check again at this instant.
     At(Instant),
-    /// Ask again when the lead's next transfer is over, at the latest at this instant.
+    /// Check again when the lead's next transfer has ended, or at this instant at the latest.
     AfterLead(Instant),
 }
 
 impl<T: Timebase + Clone> Slots<T> {
-    /// A bus whose lead has this rhythm.
+    /// Divides the time of a bus whose lead has this rhythm.
     pub const fn new(clock: T, rhythm: Rhythm) -> Self {
         Self {
             clock,
@@ -167,10 +176,10 @@ impl<T: Timebase + Clone> Slots<T> {
         }
     }
 
-    /// The two devices, and the bus to ask for its [`delays`](Self::delays).
+    /// Returns the two devices, and a reference for reading [`delays`](Self::delays).
     ///
-    /// No transfer of the guest takes longer than `longest`: one that would is given up. A guest whose `longest` does
-    /// not fit into the lead's pause transfers only when the lead is silent.
+    /// A transfer of the guest that takes longer than `longest` is given up. A guest whose
+    /// `longest` does not fit into the lead's pause transfers only while the lead is silent.
     pub const fn split<L, G>(
         &mut self,
         lead: L,
@@ -181,7 +190,8 @@ impl<T: Timebase + Clone> Slots<T> {
         (Lead { slots, device: lead }, Guest { slots, device: guest, longest }, slots)
     }
 
-    /// How often the lead had to wait for the guest. Zero while it keeps its rhythm.
+    /// Number of times the lead had to wait for the guest, modulo 2³². Zero while the lead keeps
+    /// its rhythm.
     #[must_use]
     pub fn delays(&self) -> u32 {
         self.delays.get()
@@ -190,6 +200,7 @@ impl<T: Timebase + Clone> Slots<T> {
     fn opening(&self, longest: Duration) -> Opening {
         let now = self.clock.now();
         let Rhythm { period, guard, settle } = self.rhythm;
+        // A lead that has missed two periods has failed or is restarting.
         let silent = self.ended.get().max(self.begun.get()) + period + period;
         if self.lead.get() {
             return Opening::AfterLead(now + period);
@@ -197,16 +208,20 @@ impl<T: Timebase + Clone> Slots<T> {
         if now >= silent {
             return Opening::Now;
         }
+        // The pause opens `settle` after the lead's last transfer, since another one of the same
+        // burst may follow until then. It closes early enough for the guest's longest transfer to
+        // end before the earliest start of the next burst.
         let opens = self.ended.get() + settle;
         let closes = self.begun.get() + period - (guard + longest);
         match () {
+            // No room before the next burst: wait for its end, or until the lead counts as silent.
             () if opens > closes || now > closes => Opening::AfterLead(silent),
             () if now < opens => Opening::At(opens),
             () => Opening::Now,
         }
     }
 
-    /// Waits for the guest's turn and takes it.
+    /// Waits until the guest may transfer, and marks the bus as taken.
     async fn open(&self, longest: Duration) -> Turn<'_> {
         let mut clock = self.clock.clone();
         let (mut standstill, mut stands) = (Standstill::new(), false);
@@ -229,24 +244,27 @@ impl<T: Timebase + Clone> Slots<T> {
                         Poll::Pending
                     });
                     if stands {
-                        // Without a clock only the lead's end is sure.
+                        // Without a working clock, the end of a transfer of the lead is the only
+                        // reliable event.
                         ended.await;
                         continue;
                     }
-                    // Whichever comes first.
+                    // The end of the lead's transfer or the latest instant, whichever comes first.
                     let left = latest.since(now);
                     if within(&mut clock, left, ended).await.is_none() {
                         standstill.note(left, clock.now());
                     }
                 }
             }
+            // A clock that stands still never reaches the instant of `Opening::At`.
             stands |= standstill.take();
         }
     }
 
-    /// Takes the lead's turn: at once, unless it came out of its rhythm into a transfer of the guest.
+    /// Marks the bus as taken by the lead. Waits only if the guest is transferring, which means
+    /// that the lead left its rhythm.
     async fn lead(&self) -> Turn<'_> {
-        // Taken before it waits, so that the guest does not begin another one first.
+        // Marked before the wait, so that the guest does not begin another transfer first.
         let turn = Turn::take(&self.lead, &self.waiting_guest);
         if self.guest.get() {
             self.delays.set(self.delays.get().wrapping_add(1));
@@ -260,7 +278,7 @@ impl<T: Timebase + Clone> Slots<T> {
             .await;
         }
         let now = self.clock.now();
-        // Whatever follows within half a period belongs to the same burst.
+        // Transfers within half a period after the start of a burst belong to that burst.
         if now.since(self.begun.get()) >= self.rhythm.period / 2 {
             self.begun.set(now);
         }
@@ -268,7 +286,8 @@ impl<T: Timebase + Clone> Slots<T> {
     }
 }
 
-/// The bus, taken by one of the two; given back when dropped, also in the middle of a transfer.
+/// Marks the bus as taken by one of the two devices. Dropping it, also in the middle of a transfer,
+/// releases the bus.
 struct Turn<'s> {
     taken: &'s Cell<bool>,
     waiting: &'s Cell<Option<Waker>>,
@@ -290,7 +309,7 @@ impl Drop for Turn<'_> {
     }
 }
 
-/// The end of a lead's transfer, however it ended.
+/// Records the end of a transfer of the lead when dropped, however the transfer ended.
 struct Ended<'s, T: Timebase + Clone>(&'s Slots<T>);
 
 impl<T: Timebase + Clone> Drop for Ended<'_, T> {
@@ -306,7 +325,7 @@ impl<D: ErrorType, T> ErrorType for Lead<'_, D, T> {
 
 impl<D: SpiDevice, T: Timebase + Clone> SpiDevice for Lead<'_, D, T> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), D::Error> {
-        // Dropped in the opposite order: first the end is noted, then the guest is woken.
+        // Dropped in reverse order: the end is recorded first, then the guest is woken.
         let _turn = self.slots.lead().await;
         let _ended = Ended(self.slots);
         self.device.transaction(operations).await

@@ -1,7 +1,8 @@
-//! The task of a sensor: from its driver to a topic, with pauses after errors.
+//! The task of a sensor: forwards a driver's samples to a topic and pauses after errors.
 //!
-//! [`run_sensor`] is a plain `async` function: firmware spawns one a sensor on its executor, a test polls it on virtual
-//! time. It knows neither bus nor vehicle; samples go to a closure. Not needed where a program asks a driver itself.
+//! [`run_sensor`] is an ordinary `async` function: firmware spawns one per sensor on its executor,
+//! and a test polls it on virtual time. It depends on neither bus nor vehicle, because it passes
+//! the samples to a closure. Not needed in a program that calls the driver itself.
 
 use crate::time::sleep_until;
 use crate::{Sample, SensorError, SensorErrorKind, Timebase};
@@ -10,16 +11,17 @@ use core::fmt;
 use core::sync::atomic::{AtomicU32, Ordering};
 use stampfly_types::{Duration, Instant};
 
-/// How a sensor does: samples, errors, and the last error. Written by one [`run_sensor`], read by any context.
+/// Counters of a sensor: samples, errors, and the kind of the latest error. Written by one
+/// [`run_sensor`], readable from any context.
 #[derive(Debug, Default)]
 pub struct SensorHealth {
     samples: AtomicU32,
     errors: AtomicU32,
-    /// Place in [`KINDS`] plus one, or zero.
+    /// Index into [`KINDS`] plus one, or zero before the first error.
     last: AtomicU32,
 }
 
-/// Every kind of error, so that one fits into a word.
+/// Every kind of error, so that one can be stored as an index in an atomic word.
 const KINDS: [SensorErrorKind; 10] = [
     SensorErrorKind::Bus,
     SensorErrorKind::Timeout,
@@ -40,19 +42,19 @@ impl SensorHealth {
         Self { samples: AtomicU32::new(0), errors: AtomicU32::new(0), last: AtomicU32::new(0) }
     }
 
-    /// Samples published since power-on, modulo 2³².
+    /// Number of samples published since power-on, modulo 2³².
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.samples.load(Ordering::Relaxed)
     }
 
-    /// Errors since power-on, modulo 2³².
+    /// Number of errors since power-on, modulo 2³².
     #[must_use]
     pub fn errors(&self) -> u32 {
         self.errors.load(Ordering::Relaxed)
     }
 
-    /// The newest error, whether or not the driver has recovered.
+    /// The latest error, whether or not the driver has recovered from it.
     #[must_use]
     pub fn last_error(&self) -> Option<SensorErrorKind> {
         let place = self.last.load(Ordering::Relaxed).checked_sub(1)?;
@@ -60,12 +62,14 @@ impl SensorHealth {
     }
 
     fn count(counter: &AtomicU32) {
-        // One task writes; a load and a store are enough on cores without atomic addition.
+        // Only one task writes, so a load and a store suffice, also on cores without atomic
+        // addition.
         counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
     fn note(&self, kind: SensorErrorKind) {
         Self::count(&self.errors);
+        // A kind that is missing in the table counts as `Other`, its last entry.
         let place = KINDS.iter().position(|known| *known == kind).unwrap_or(KINDS.len() - 1);
         self.last.store(place as u32 + 1, Ordering::Relaxed);
     }
@@ -79,12 +83,13 @@ impl fmt::Display for SensorHealth {
     }
 }
 
-/// The pause grows to `pause` times two to the power of this.
+/// The longest pause is `pause` times two to the power of this.
 const MAX_DOUBLINGS: u32 = 4;
 
-/// Exponential backoff: how long a driver waits after an error before its next attempt.
+/// Exponential backoff: the pause after an error, before the driver's next attempt.
 ///
-/// After `constant_for` errors in a row, each pause is twice as long as the one before, up to sixteen times `pause`.
+/// After `constant_for` errors in a row, each pause is twice as long as the one before, up to
+/// sixteen times `pause`.
 ///
 /// ```
 /// use stampfly_driver_core::task::Backoff;
@@ -96,41 +101,43 @@ const MAX_DOUBLINGS: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Backoff {
-    /// The first pause.
+    /// Length of the first pause.
     pub pause: Duration,
-    /// How many pauses are of that length.
+    /// Number of errors in a row after which the pause starts to grow.
     pub constant_for: u32,
 }
 
 impl Backoff {
-    /// For a chip that shares its bus with others that are as important: it leaves them the bus at once.
+    /// For a chip that shares its bus with devices of equal importance: the pause grows from the
+    /// second error in a row on.
     pub const SHARED: Self = Self { pause: Duration::from_millis(5), constant_for: 1 };
-    /// For the sensor that the motors wait for, on a bus of its own: tried again at its own period for 40 ms, longer than
-    /// motors turn without it.
+    /// For the sensor that the motors depend on, on a bus of its own. Retries at the sensor's own
+    /// period for 40 ms, longer than the motors turn without it, before the pause grows.
     pub const CRITICAL: Self = Self { pause: Duration::from_micros(2_500), constant_for: 16 };
 
-    /// The pause after so many errors in a row.
+    /// The pause after this number of errors in a row.
     #[must_use]
     pub fn after(self, errors: u32) -> Duration {
         self.pause * (1 << MAX_DOUBLINGS.min(errors.saturating_sub(self.constant_for)))
     }
 }
 
-/// The pause, less up to a quarter.
+/// Shortens the pause by up to a quarter.
 ///
-/// Two drivers that fail together, one because the other's chip holds the bus, would otherwise try again together each
-/// time, and the healthy one would never get a sample. The clock is the source of the jitter: it needs no seed, and a
-/// simulated flight repeats. The factor is 2⁶⁴ divided by the golden ratio, as in Fibonacci hashing.
+/// Two drivers can fail together, for example when one chip holds the bus. Without jitter they
+/// would retry together each time, and the healthy chip would never deliver a sample. The time is
+/// the source of the jitter: it needs no seed, and a simulated flight stays repeatable. The factor
+/// is 2⁶⁴ divided by the golden ratio, as in Fibonacci hashing.
 fn with_jitter(now: Instant, pause: Duration) -> Duration {
     let random = now.as_micros().wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
     pause - Duration::from_micros(random.checked_rem((pause / 4).as_micros()).unwrap_or(0))
 }
 
-/// Publishes a driver's samples, as long as it is polled. After an error it waits as `backoff` says, so that a chip that
-/// does not answer costs its neighbours on the bus next to nothing. Each pause is up to a quarter shorter, at random, so
-/// that two drivers do not collide again and again.
+/// Publishes a driver's samples for as long as it is polled. After an error it pauses according to
+/// `backoff`, so that a chip that does not answer takes hardly any bus time from its neighbours.
+/// Each pause is shortened by up to a quarter, so that two failing drivers do not retry in step.
 ///
-/// Silence is not reported: a reader of the topic sees the age of the newest sample.
+/// A silent sensor is not an error here: a reader of the topic sees the age of the newest sample.
 ///
 /// ```
 /// use stampfly_driver_core::task::{Backoff, SensorHealth, run_sensor};
@@ -162,7 +169,8 @@ fn with_jitter(now: Instant, pause: Duration) -> Duration {
 /// ```
 ///
 /// # Cancellation
-/// Dropping the future drops the driver's call or the pause. Nothing is published then; a new task starts afresh.
+/// Dropping the future drops the driver's call or the pause. No sample is published then, and a new
+/// task starts with the first pause of `backoff`.
 pub async fn run_sensor<M, E: SensorError>(
     mut next: impl AsyncFnMut() -> Result<Sample<M>, E>,
     mut publish: impl FnMut(Instant, &M),

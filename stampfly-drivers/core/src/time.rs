@@ -6,16 +6,18 @@ use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
 use stampfly_types::{Duration, Instant};
 
-/// What a driver needs to stamp its samples and to keep a chip's delays.
+/// Time stamps and delays for a driver.
 ///
-/// Implemented by boards on a hardware timer and by the simulator on virtual time. Only drivers and the tasks
-/// that run them hold one; everything that computes is told the time instead.
+/// Implemented by boards on a hardware timer and by the simulator on virtual time. Only drivers and
+/// their tasks hold one; computing components get the time as an argument.
 ///
-/// Each driver has its own, so that delays need not be `Clone`, as those of many boards are not. One that exists but once is lent
-/// to one driver after the other: `&mut T` is a time base as well.
+/// Each driver has a time base of its own, because the delays of many boards are not `Clone`. A
+/// delay of which only one exists can be lent to one driver after the other: `&mut T` is a time
+/// base, too.
 ///
-/// Both halves have to agree: after a delay [`now`](Self::now) has moved on. Drivers bound their waits by it and say
-/// [`ChipError::ClockStopped`](crate::chip::ChipError::ClockStopped) when it does not.
+/// Both halves have to agree: after a delay, [`now`](Self::now) has advanced. Drivers bound their
+/// waits with it and return [`ChipError::ClockStopped`](crate::chip::ChipError::ClockStopped) when
+/// it does not advance.
 pub trait Timebase: DelayNs {
     /// Time since power-on.
     fn now(&self) -> Instant;
@@ -27,7 +29,7 @@ impl<T: Timebase> Timebase for &mut T {
     }
 }
 
-/// Waits until an instant; returns at once when it has passed.
+/// Waits until `instant`; returns at once when it has passed.
 pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Instant) {
     let left = instant.since(clock.now());
     if left > Duration::ZERO {
@@ -35,10 +37,12 @@ pub async fn sleep_until<T: Timebase>(clock: &mut T, instant: Instant) {
     }
 }
 
-/// Waits that the clock took no notice of, in all, after which it counts as standing still. Clocks of 10 ms a tick are none of them.
+/// Total of waits without any advance of the clock, after which the clock counts as stopped. A
+/// clock with ticks of 10 ms does not reach it.
 const STANDSTILL: Duration = Duration::from_millis(100);
 
-/// Notices a clock that stands still although delays end: a deadline would never come, and whoever polls until then would poll for ever.
+/// Detects a clock that stands still although delays return. With such a clock no deadline passes,
+/// and a polling loop would never end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Standstill {
     latest: Instant,
@@ -46,18 +50,18 @@ pub(crate) struct Standstill {
 }
 
 impl Standstill {
-    /// Nothing known of the clock.
+    /// No wait has been observed yet.
     pub(crate) const fn new() -> Self {
         Self { latest: Instant::ZERO, waited: Duration::ZERO }
     }
 
-    /// A wait is over; it was to take so long.
+    /// Records a wait of nominal length `wait` that has ended at `now`.
     pub(crate) fn note(&mut self, wait: Duration, now: Instant) {
         self.waited = if now > self.latest { Duration::ZERO } else { self.waited + wait };
         self.latest = now;
     }
 
-    /// Does the clock stand still? Begins anew when it does.
+    /// Whether the clock stands still. Starts over when it does.
     pub(crate) fn take(&mut self) -> bool {
         let stands = self.waited >= STANDSTILL;
         if stands {
@@ -67,9 +71,9 @@ impl Standstill {
     }
 }
 
-/// The outcome of a future, or `None` when it takes longer than `limit`; it is dropped then.
+/// Runs a future for at most `limit`. Drops it and returns `None` when it takes longer.
 ///
-/// The future is polled first, so one that never waits costs no timer.
+/// The future is polled before the timer, so a future that is ready at once starts no timer.
 pub(crate) async fn within<T: Timebase, F: Future>(clock: &mut T, limit: Duration, future: F) -> Option<F::Output> {
     let mut alarm = pin!(clock.delay_us(u32::try_from(limit.as_micros()).unwrap_or(u32::MAX)));
     let mut future = pin!(future);

@@ -1,4 +1,4 @@
-//! A clock that jumps instead of waiting, and buses whose chip is a closure.
+//! A clock that jumps instead of waiting, and buses whose chip is a closure. For tests of drivers.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -9,27 +9,29 @@ use stampfly_driver_core::chip::{Axis, AxisMap};
 use stampfly_types::Instant;
 use std::rc::Rc;
 
-/// How the chips are turned, no axis as in the body: body = (z, −x, −y) of the chip.
+/// Mounting of the chips, with every axis different from the body's: body = (z, −x, −y) of the
+/// chip.
 pub const AXES: AxisMap = AxisMap::new(Axis::PlusZ, Axis::MinusX, Axis::MinusY).expect("a rotation");
 
-/// Virtual time in nanoseconds. Whoever waits moves it on, unless it is stopped: then a wait never ends.
+/// Virtual time in nanoseconds. A wait advances it at once. While the clock is stopped, waits never
+/// end.
 #[derive(Clone, Debug)]
 pub struct Clock(Rc<Cell<u64>>, Rc<Cell<bool>>);
 
 impl Default for Clock {
-    /// A second after power-on.
+    /// Starts one second after power-on.
     fn default() -> Self {
         Self(Rc::new(Cell::new(1_000_000_000)), Rc::new(Cell::new(false)))
     }
 }
 
 impl Clock {
-    /// Lets waits never end from now on, or end again.
+    /// Stops the clock, so that waits never end, or starts it again.
     pub fn stop(&self, stopped: bool) {
         self.1.set(stopped);
     }
 
-    /// So much time passes.
+    /// Advances the time.
     pub fn advance(&self, micros: u64) {
         self.0.set(self.0.get() + micros * 1_000);
     }
@@ -50,18 +52,18 @@ impl Timebase for Clock {
     }
 }
 
-/// What the driver did.
+/// An access of the driver.
 pub enum Access<'a> {
-    /// It read from a register on.
+    /// A read, starting at a register.
     Read(u8, &'a mut [u8]),
-    /// It wrote from a register on.
+    /// A write, starting at a register.
     Write(u8, &'a [u8]),
 }
 
-/// What a chip can do wrong.
+/// A fault of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It does not acknowledge.
+    /// The chip does not acknowledge.
     Nack,
     /// The transfer never ends.
     Hang,
@@ -79,19 +81,19 @@ impl spi::Error for Fault {
     }
 }
 
-/// A chip as a closure.
+/// A chip as a boxed closure.
 pub type AnyChip = Box<dyn FnMut(Access<'_>) -> Result<(), Fault>>;
 
-/// How long a transfer takes.
+/// Duration of a transfer, µs.
 pub const TRANSFER: u64 = 20;
 
 /// An I2C bus with one chip.
 pub struct I2cBus<F> {
-    /// The chip's.
+    /// Address of the chip.
     pub address: u8,
-    /// Moves on with every transfer.
+    /// Advances with every transfer.
     pub clock: Clock,
-    /// What the chip does.
+    /// Behaviour of the chip.
     pub chip: F,
 }
 
@@ -113,11 +115,12 @@ impl<F: FnMut(Access<'_>) -> Result<(), Fault>> i2c::I2c for I2cBus<F> {
     }
 }
 
-/// An SPI device of Bosch's, with a dummy byte before the data of a read, as the inertial sensors have it, or without.
+/// An SPI device of Bosch's, with a dummy byte before the data of a read, as inertial sensors have
+/// it, or without one.
 pub struct SpiBus<F> {
-    /// Moves on with every transfer.
+    /// Advances with every transfer.
     pub clock: Clock,
-    /// What the chip does.
+    /// Behaviour of the chip.
     pub chip: F,
 }
 
@@ -128,7 +131,7 @@ impl<F> spi::ErrorType for SpiBus<F> {
 impl<F: FnMut(Access<'_>) -> Result<(), Fault>> spi::SpiDevice for SpiBus<F> {
     async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), Fault> {
         let outcome = match operations {
-            // Address with the read bit, one dummy byte, data.
+            // The address with the read bit, an optional dummy byte, the data.
             [spi::Operation::Write([register, 0] | [register]), spi::Operation::Read(into)] if register & 0x80 != 0 => {
                 (self.chip)(Access::Read(register & 0x7F, into))
             }
@@ -141,7 +144,7 @@ impl<F: FnMut(Access<'_>) -> Result<(), Fault>> spi::SpiDevice for SpiBus<F> {
     }
 }
 
-/// Ends a transfer: it took its time, or it never ends.
+/// Ends a transfer: after its duration, or never.
 pub async fn finish(clock: &Clock, outcome: Result<(), Fault>) -> Result<(), Fault> {
     if outcome == Err(Fault::Hang) {
         std::future::pending::<Infallible>().await;
@@ -150,7 +153,7 @@ pub async fn finish(clock: &Clock, outcome: Result<(), Fault>) -> Result<(), Fau
     outcome
 }
 
-/// Polls a call once, which must not end it, and drops it.
+/// Polls a call once, asserts that it is still pending, and drops it.
 pub fn cancel(call: impl Future) {
     let mut call = std::pin::pin!(call);
     let mut context = std::task::Context::from_waker(std::task::Waker::noop());

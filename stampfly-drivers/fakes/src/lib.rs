@@ -1,6 +1,7 @@
-//! Chips and clocks for the tests and examples of the drivers: [`closure`] for tests, [`memory`] for examples.
+//! Chips and clocks for tests and examples of the drivers: [`closure`] for tests, [`memory`] for
+//! examples.
 //!
-//! Not for programs: nothing here is anything like hardware. Emulated chips are in `stampfly-sim`.
+//! Not for programs, and not a model of hardware. Emulated chips are in `stampfly-sim`.
 
 pub mod closure;
 pub mod memory;

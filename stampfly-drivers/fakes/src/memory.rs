@@ -1,6 +1,8 @@
-//! Chips as memories, for the examples in the documentation: what is written can be read back, and what the example
-//! gives is there to be read. No chip has a rhythm, no time passes but what the driver waits for. Not for tests of a driver: it
-//! can do nothing wrong.
+//! Chips as memories, for the examples in the documentation.
+//!
+//! Written values can be read back, and the example provides the initial contents. The chips have
+//! no timing, and only the driver's waits advance the clock. Not for tests of a driver, because the
+//! chips have no faults.
 
 pub use crate::closure::Clock;
 use core::cell::Cell;
@@ -10,21 +12,21 @@ use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use std::rc::Rc;
 
-/// A bus with one chip, and the pin that keeps it in reset.
+/// A bus with one chip, and its reset pin.
 pub struct Chip {
     memory: [u8; 4096],
-    /// Registers that are read in one piece, longest memory first.
+    /// Registers that are read in one piece, longest contents first.
     pieces: Vec<(u16, Vec<u8>)>,
-    /// The flow sensor's bank of registers, 128 of them.
+    /// The register bank of the flow sensor; each bank has 128 registers.
     bank: u16,
-    /// Out of reset, if a pin says so.
+    /// The chip is out of reset, if it has a pin.
     pub awake: Rc<Cell<bool>>,
     /// Registers have addresses of two bytes.
     is_wide: bool,
 }
 
 impl Chip {
-    /// A chip in whose memory this is, from each register on.
+    /// A chip with these contents, each from a register on.
     #[must_use]
     pub fn new(content: &[(u16, &[u8])]) -> Self {
         let is_wide = content.iter().any(|(register, _)| *register > 0xFF);
@@ -98,7 +100,7 @@ impl SpiDevice for Chip {
     }
 }
 
-/// A pin that keeps a chip in reset.
+/// A reset pin of a chip.
 #[derive(Default)]
 pub struct Pin(pub Rc<Cell<bool>>);
 

@@ -1,4 +1,5 @@
-//! An INA3221 emulated down to its registers, on this PC: the battery of a simulated vehicle, and the truth beside it.
+//! Runs the driver on a register-level emulation of an INA3221 on this PC. Prints the battery state
+//! of a simulated vehicle next to the true values.
 //!
 //! `cargo run -p stampfly-ina3221 --example emulated-ina3221`, in the repository.
 

@@ -1,7 +1,10 @@
-//! An INA3221 on a computer with Linux, such as a Raspberry Pi: on I2C at `/dev/i2c-1`. Shows
-//! voltage and current of one channel.
+//! An INA3221 on a computer with Linux, such as a Raspberry Pi. Prints voltage and current of one
+//! channel.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example ina3221` there.
+//! Wiring: I2C at `/dev/i2c-1`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example ina3221`.
 
 use linux_embedded_hal::{Delay, I2cdev};
 use stampfly_ina3221::blocking::{Blocking, BlockingClock, block_on};

@@ -1,7 +1,10 @@
-//! An INA3221 on a Raspberry Pi Pico 2: SDA at GP4, SCL at GP5. Shows voltage and current of one channel
-//! through the debug probe.
+//! An INA3221 on a Raspberry Pi Pico 2. Prints voltage and current of one channel through the debug
+//! probe.
 //!
-//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example ina3221` there.
+//! Wiring: SDA GP4, SCL GP5.
+//!
+//! Build it in `stampfly-drivers/boards/rp2350`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example ina3221`.
 
 #![no_std]
 #![no_main]

@@ -1,7 +1,10 @@
-//! An INA3221 on an STM32F411 (a "Black Pill"): SDA at PB9, SCL at PB8. Shows voltage and current of one channel
-//! through the debug probe.
+//! An INA3221 on an STM32F411 ("Black Pill"). Prints voltage and current of one channel through the
+//! debug probe.
 //!
-//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example ina3221` there.
+//! Wiring: SDA PB9, SCL PB8.
+//!
+//! Build it in `stampfly-drivers/boards/stm32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example ina3221`.
 
 #![no_std]
 #![no_main]

@@ -1,5 +1,5 @@
-//! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high byte first,
-//! described in its §8.6 "Register Maps".
+//! Registers and scales of the INA3221, from Texas Instruments SBOS576B. Registers are words, high
+//! byte first, described in its §8.6 "Register Maps".
 
 use super::config::Config;
 pub use super::config::{Average, Channel, ConversionTime};
@@ -7,42 +7,45 @@ use stampfly_types::Duration;
 
 /// Register addresses, §8.6.1.
 pub mod register {
-    /// Channels, averages, times, mode.
+    /// Channels, averaging, conversion times, mode.
     pub const CONFIGURATION: u8 = 0x00;
-    /// Shunt voltage of channel 1; its bus voltage and those of the other channels follow.
+    /// Shunt voltage of channel 1, followed by its bus voltage and the registers of the other
+    /// channels.
     pub const SHUNT_1: u8 = 0x01;
     /// Flags.
     pub const MASK_ENABLE: u8 = 0x0F;
-    /// Who made it: [`MANUFACTURER_VALUE`](super::MANUFACTURER_VALUE).
+    /// Manufacturer: [`MANUFACTURER_VALUE`](super::MANUFACTURER_VALUE).
     pub const MANUFACTURER: u8 = 0xFE;
-    /// What it is: [`DIE_VALUE`](super::DIE_VALUE).
+    /// Part: [`DIE_VALUE`](super::DIE_VALUE).
     pub const DIE: u8 = 0xFF;
 }
 
 /// "TI", §8.6.2.
 pub const MANUFACTURER_VALUE: u16 = 0x5449;
-/// §8.6.2.
+/// Value of [`register::DIE`], §8.6.2.
 pub const DIE_VALUE: u16 = 0x3220;
 /// Reset, in [`register::CONFIGURATION`].
 pub const RESET: u16 = 0x8000;
-/// All conversions of the enabled channels are done; reading it clears it. In [`register::MASK_ENABLE`].
+/// All conversions of the enabled channels are complete; cleared by a read. In
+/// [`register::MASK_ENABLE`].
 pub const CONVERSION_READY: u16 = 0x0001;
-/// A supply on a bus pin in counts of 8 mV: something, and no more than 26 V ("Recommended operating conditions"), though
-/// the register could say more.
+/// Valid range of a bus voltage in counts of 8 mV: above zero and at most 26 V ("Recommended
+/// operating conditions"), less than the range of the register.
 const BUS: core::ops::RangeInclusive<i16> = 1..=3_250;
-/// The shunt registers' ends, without their three low bits: what does not fit is one of them.
+/// Limits of the shunt registers without their three low bits. A voltage out of range reads as one
+/// of them.
 const SHUNT_ENDS: [i16; 2] = [-4_096, 4_095];
-/// Shunt and bus, continuously.
+/// Continuous conversion of shunt and bus.
 const CONTINUOUS: u16 = 0b111;
 
 impl Channel {
-    /// Address of its shunt voltage.
+    /// Address of the shunt voltage.
     #[must_use]
     pub const fn shunt_register(self) -> u8 {
         register::SHUNT_1 + 2 * self as u8
     }
 
-    /// Address of its bus voltage.
+    /// Address of the bus voltage.
     #[must_use]
     pub const fn bus_register(self) -> u8 {
         self.shunt_register() + 1
@@ -79,7 +82,8 @@ impl ConversionTime {
     }
 }
 
-/// CONFIGURATION: the channels that have a shunt, the same time for shunt and bus.
+/// CONFIGURATION with the channels that have a shunt, and the same conversion time for shunt and
+/// bus.
 #[must_use]
 pub const fn configuration(config: &Config) -> u16 {
     let time = config.time as u16;
@@ -88,13 +92,13 @@ pub const fn configuration(config: &Config) -> u16 {
     channels | (config.average as u16) << 9 | time << 6 | time << 3 | CONTINUOUS
 }
 
-/// Is each channel measured? One or zero.
+/// Whether each channel is measured, as one or zero.
 const fn enabled(config: &Config) -> [u16; 3] {
     let [one, two, three] = config.shunts_ohms;
     [one.is_some() as u16, two.is_some() as u16, three.is_some() as u16]
 }
 
-/// From one result to the next: shunt and bus of one channel after the other.
+/// Time between two results: the conversions of shunt and bus of all channels in sequence.
 #[must_use]
 pub const fn cycle(config: &Config) -> Duration {
     let [one, two, three] = enabled(config);
@@ -102,20 +106,20 @@ pub const fn cycle(config: &Config) -> Duration {
     Duration::from_micros(channels * 2 * config.average.conversions() * config.time.micros())
 }
 
-/// Voltage over the shunt, V: 13 bits, left-justified, 40 µV each, §8.6.2.
+/// Shunt voltage, V: 13 bits, left-justified, 40 µV each, §8.6.2.
 #[must_use]
 pub fn shunt_volts(register: u16) -> f32 {
     f32::from((register as i16) >> 3) * 40e-6
 }
 
-/// Voltage of the bus, V: 13 bits, left-justified, 8 mV each, §8.6.2.
+/// Bus voltage, V: 13 bits, left-justified, 8 mV each, §8.6.2.
 #[must_use]
 pub fn bus_volts(register: u16) -> f32 {
     f32::from((register as i16) >> 3) * 8e-3
 }
 
-/// Are these two registers, of shunt and bus, what a supply on this channel can give? Something, but no more than the pin
-/// may have, and a shunt voltage within the scale.
+/// Whether these registers of shunt and bus are plausible for a supply: a bus voltage above zero
+/// and within the operating conditions of the pin, and a shunt voltage within the scale.
 #[must_use]
 pub fn is_measurable(shunt: u16, bus: u16) -> bool {
     BUS.contains(&((bus as i16) >> 3)) && !SHUNT_ENDS.contains(&((shunt as i16) >> 3))
@@ -127,7 +131,7 @@ mod tests {
 
     #[test]
     fn scales_are_those_of_the_data_sheet() {
-        // −80 mV is 2000 counts of 40 µV in two's complement: 0xC180.
+        // −80 mV are 2000 counts of 40 µV in two's complement: 0xC180.
         assert!((shunt_volts(0xC180) + 0.08).abs() < 1e-7);
         assert!((shunt_volts(0x7FF8) - 0.163_8).abs() < 1e-6, "full scale");
         assert!((bus_volts(0x7FF8) - 32.76).abs() < 1e-4, "full scale");
@@ -137,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_configuration_word_is_the_reset_value_with_other_choices() {
-        // Reset value 0x7127: three channels, no average, 1.1 ms, continuous.
+        // Reset value 0x7127: three channels, no averaging, 1.1 ms, continuous.
         let config = Config { average: Average::A1, time: ConversionTime::Us1100, ..Config::default() };
         assert_eq!(configuration(&config), 0x2127, "channel 2 only");
         let shunt = Some(0.01);

@@ -1,22 +1,24 @@
-//! What an INA3221 and its driver are told: channels, shunts, averages. How the registers say it is in
-//! [`codec`](super::codec).
+//! Configuration of an INA3221 and its driver: channels, shunts, averaging. The register codes are
+//! in [`codec`](super::codec).
 
-/// What the chip and the driver are told.
+/// Configuration of the chip and the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// The channel of [`PowerMonitor::next`](crate::PowerMonitor::next), and of the self test: the battery's.
+    /// Channel of [`PowerMonitor::next`](crate::PowerMonitor::next) and of the self test: the
+    /// battery's.
     pub channel: Channel,
-    /// Resistance of each channel's shunt, Ω; `None` for one that is not measured. Each that is makes a sample take longer.
+    /// Resistance of each channel's shunt, Ω; `None` for a channel that is not measured. Each
+    /// measured channel lengthens the time per sample.
     pub shunts_ohms: [Option<f32>; 3],
-    /// Conversions in a sample, of each channel.
+    /// Number of conversions per sample and channel.
     pub average: Average,
-    /// Time of one conversion, of shunt and bus alike.
+    /// Time of one conversion, for shunt and bus.
     pub time: ConversionTime,
 }
 
 impl Config {
-    /// Resistance of a channel's shunt, Ω, if it is measured.
+    /// Resistance of a channel's shunt, Ω; `None` for a channel that is not measured.
     #[must_use]
     pub const fn shunt(&self, channel: Channel) -> Option<f32> {
         let [one, two, three] = self.shunts_ohms;
@@ -29,7 +31,8 @@ impl Config {
 }
 
 impl Default for Config {
-    /// The StampFly's: 0.01 Ω on channel 2 (R12 of its schematic); 64 times 588 µs, a sample every 75 ms.
+    /// For the StampFly: 0.01 Ω on channel 2 (R12 of its schematic), 64 times 588 µs, which gives a
+    /// sample every 75 ms.
     fn default() -> Self {
         Self {
             channel: Channel::Two,
@@ -40,7 +43,7 @@ impl Default for Config {
     }
 }
 
-/// Which pair of pins the shunt is on.
+/// Pair of pins to which a shunt is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -51,11 +54,11 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// In the chip's order.
+    /// All channels in the chip's order.
     pub const ALL: [Self; 3] = [Self::One, Self::Two, Self::Three];
 }
 
-/// Conversions averaged into one.
+/// Number of conversions averaged into one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]

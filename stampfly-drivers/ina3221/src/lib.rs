@@ -16,18 +16,18 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, blocking, embedded_
 pub use stampfly_types::messages::PowerData;
 pub use stampfly_types::{Duration, Instant};
 
-/// From a reset to the first access. The data sheet gives no figure.
+/// Time from a reset to the first access. The data sheet does not specify it.
 const AFTER_RESET: Duration = Duration::from_millis(1);
-/// How often the flag is looked at once it may be up.
+/// Pause between two reads of the flag while a result is expected.
 const POLL: Duration = Duration::from_millis(2);
-/// The single conversion of the self test takes 2.2 ms.
+/// Time limit of the single conversion of the self test, which takes 2.2 ms.
 const SELF_TEST_LIMIT: Duration = Duration::from_millis(10);
 
 /// The driver. Implements [`PowerMonitor`].
 ///
-/// `Sample::at` is the middle of the average. The resolution of 40 µV is 4 mA at 0.01 Ω, the range ±16 A. The chip
-/// keeps only its newest result and does not say since when: a reader that comes late gets the one after it. `next` ends
-/// within two averages and 20 ms.
+/// `Sample::at` is the middle of the averaging time. The resolution of 40 µV corresponds to 4 mA at
+/// 0.01 Ω, the range to ±16 A. The chip stores only its newest result and not its time, so a late
+/// caller gets the following result. `next` returns within two averaging times and 20 ms.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock};
@@ -46,12 +46,12 @@ pub struct Ina3221<R, T> {
     port: Port<R, T>,
     config: Config,
     running: bool,
-    /// When the next result may be there.
+    /// Earliest time of the next result.
     due: Instant,
 }
 
 impl Ina3221<(), ()> {
-    /// Address with A0 at ground, as on the StampFly.
+    /// Address with A0 connected to ground, as on the StampFly.
     pub const A0_GROUND: u8 = 0x40;
 }
 
@@ -62,10 +62,11 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         Self { port, config, running: false, due: Instant::ZERO }
     }
 
-    /// Sets the chip up: identification, reset, configuration. A millisecond.
+    /// Sets the chip up: identification, reset, configuration. Takes one millisecond.
     ///
     /// # Errors
-    /// Another chip, a shunt that cannot be or none on [`Config::channel`], the bus.
+    /// [`ChipError::Identification`], [`ChipError::InvalidConfiguration`] for an invalid shunt or
+    /// none on [`Config::channel`], and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
         self.running = false;
         let can_be = |ohms: f32| ohms.is_finite() && ohms > 0.0;
@@ -89,22 +90,26 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         Ok(())
     }
 
-    /// Sets the chip up, has it keep its settings and make one conversion, whatever the average. 6 ms, 2.2 ms more for
-    /// every further channel, within 0.2 s however slow the bus, with [`TransferLimit::I2C_SENSORS`].
+    /// Sets the chip up, checks that it keeps its settings, and makes one conversion, independent
+    /// of the averaging. 6 ms, 2.2 ms more for every further channel, at most 0.2 s on a slow bus
+    /// with [`TransferLimit::I2C_SENSORS`].
     ///
-    /// The chip has no self test of its own: this one asks whether there is a supply on the configured channel, and whether
-    /// the shunt's voltage can be measured. 0 V do not pass: no battery, another channel's shunt and a dead converter look
-    /// the same. Leaves the chip to be set up by the next call.
+    /// The chip has no self test of its own: this one checks for a supply on the configured channel
+    /// and a shunt voltage within the scale. 0 V fails, because a missing battery, a shunt on
+    /// another channel and a faulty converter cannot be distinguished. The next call sets the chip
+    /// up again.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start); [`ChipError::Configuration`] when the settings were not kept, with the upper byte of
-    /// what is there instead; [`ChipError::NoSample`] without a conversion; [`ChipError::SelfTest`] for a supply that is
-    /// not above 0 V and at most 26 V, or a shunt beyond the scale of ±163.8 mV, as an open one is.
+    /// Those of [`start`](Self::start); [`ChipError::Configuration`] when the settings were not
+    /// kept, with the upper byte of the value read back; [`ChipError::NoSample`] without a
+    /// conversion; [`ChipError::SelfTest`] for a supply that is not above 0 V or exceeds 26 V, or a
+    /// shunt voltage beyond the scale of ±163.8 mV, as with an open shunt.
     pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
         self.start().await?;
         self.running = false;
         let config = self.config;
         self.keeps(&config).await?;
+        // A single conversion, because the configured averaging may take seconds.
         let single = Config { average: Average::A1, time: ConversionTime::Us1100, ..config };
         self.write(codec::configuration(&single)).await?;
         self.keeps(&single).await?;
@@ -124,8 +129,8 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         if codec::is_measurable(shunt, bus) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// The next result of every channel that has a shunt, in the chip's order. A result that this has given does not come from
-    /// [`next`](PowerMonitor::next) as well, and the other way round.
+    /// The next result of every channel that has a shunt, in the chip's order. Each result is
+    /// returned once, either by this method or by [`next`](PowerMonitor::next).
     ///
     /// # Errors
     /// Those of [`start`](Self::start) and [`next`](PowerMonitor::next).
@@ -142,19 +147,19 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
 
     stampfly_driver_core::transfer_limit!();
 
-    /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+    /// Takes the driver apart and returns the bus and the clock. The chip continues to measure.
     pub fn release(self) -> (I, T) {
         self.port.release()
     }
 
-    /// What the registers of a channel hold.
+    /// Reads the result of a channel.
     async fn measured(&mut self, channel: Channel, shunt_ohms: f32) -> Result<PowerData, ChipError<I::Error>> {
         let current = codec::shunt_volts(self.read(channel.shunt_register()).await?) / shunt_ohms;
         let voltage = codec::bus_volts(self.read(channel.bus_register()).await?);
         Ok(PowerData { voltage, current, power: voltage * current })
     }
 
-    /// Refuses a chip that does not hold this configuration.
+    /// Checks that the chip holds this configuration.
     async fn keeps(&mut self, config: &Config) -> Result<(), ChipError<I::Error>> {
         let kept = self.read(register::CONFIGURATION).await?;
         let [status, _] = kept.to_be_bytes();
@@ -169,7 +174,8 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         self.port.write(register::CONFIGURATION, &configuration.to_be_bytes()).await
     }
 
-    /// Starts the chip if it does not run, waits for the flag that a result is there, and gives the middle of its average.
+    /// Starts the chip if necessary, waits for a result, and returns the middle of its averaging
+    /// time.
     async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
         if !self.running {
             self.start().await?;
@@ -177,11 +183,13 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
         let cycle = codec::cycle(&self.config);
         let asked = self.port.now();
         let deadline = asked + cycle + cycle;
-        // A flag that may have been up for long tells nothing about when: take it down and wait for the next.
+        // A flag that may have been set for some time does not show when: clear it and wait for the
+        // next.
         let mut stale = asked > self.due + cycle / 8;
         self.port.wait_until(self.due).await;
         loop {
             let looks = self.port.now();
+            // A chip that restarted measures all channels with other timing.
             if self.read(register::CONFIGURATION).await? != codec::configuration(&self.config) {
                 self.running = false;
                 return Err(ChipError::Restarted);
@@ -189,7 +197,7 @@ impl<I: I2c, T: Timebase> Ina3221<I2cRegisters<I>, T> {
             let flags = self.read(register::MASK_ENABLE).await?;
             let now = self.port.now();
             if flags & codec::CONVERSION_READY != 0 && !stale {
-                // A little early: the chip's clock may be fast by a few per cent.
+                // Slightly early, because the chip's clock may be fast by a few per cent.
                 self.due = now + cycle - cycle / 16;
                 return Ok(now - cycle / 2);
             }
@@ -209,7 +217,7 @@ impl<I: I2c, T: Timebase> PowerMonitor for Ina3221<I2cRegisters<I>, T> {
     async fn next(&mut self) -> Result<Sample<PowerData>, Self::Error> {
         let at = self.ready().await?;
         let channel = self.config.channel;
-        // The start refuses a channel without a shunt.
+        // `start` refuses a channel without a shunt.
         let shunt = self.config.shunt(channel).ok_or(ChipError::InvalidConfiguration)?;
         Ok(Sample { at, data: self.measured(channel, shunt).await? })
     }

@@ -1,4 +1,4 @@
-//! The INA3221 driver against a chip of closures that averages in its own time.
+//! Tests of the INA3221 driver on a chip made of closures that averages with its own period.
 
 use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_core::chip::{ChipError, I2cRegisters};
@@ -13,7 +13,7 @@ struct Chip {
     clock: Clock,
     registers: [u16; 256],
     begun: Instant,
-    /// Results that have been reported.
+    /// Number of results that have been reported.
     reported: u64,
     cycle: u64,
     fault: Option<Fault>,

@@ -1,4 +1,5 @@
-//! An MPU-6000 emulated down to its registers, on this PC: a vehicle that stands still is pulled down by 1 g.
+//! Runs the driver on a register-level emulation of an MPU-6000 on this PC: a vehicle at rest
+//! measures 1 g.
 //!
 //! `cargo run -p stampfly-mpu6000 --example emulated-mpu6000`, in the repository.
 

@@ -1,7 +1,10 @@
-//! An MPU-6000 on a computer with Linux, such as a Raspberry Pi: on SPI at `/dev/spidev0.0`. Shows
-//! acceleration and angular rate.
+//! An MPU-6000 on a computer with Linux, such as a Raspberry Pi. Prints acceleration and angular
+//! rate.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example mpu6000` there.
+//! Wiring: SPI at `/dev/spidev0.0`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example mpu6000`.
 
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
 use linux_embedded_hal::{Delay, SpidevDevice};

@@ -1,7 +1,10 @@
-//! An MPU-6000 on an STM32F411 (a "Black Pill"): SCK at PA5, SDI at PA7, SDO at PA6, chip select at PA4. Shows acceleration and angular rate
-//! through the debug probe.
+//! An MPU-6000 on an STM32F411 ("Black Pill"). Prints acceleration and angular rate through the
+//! debug probe.
 //!
-//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example mpu6000` there.
+//! Wiring: SCK PA5, SDI PA7, SDO PA6, chip select PA4.
+//!
+//! Build it in `stampfly-drivers/boards/stm32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example mpu6000`.
 
 #![no_std]
 #![no_main]
@@ -35,13 +38,13 @@ async fn main(_spawner: Spawner) {
     let select = Output::new(board.PA4, Level::High, Speed::VeryHigh);
     let Ok(device) = ExclusiveDevice::new(bus, select, Delay);
     let imu = Mpu6000::new(device, EmbassyClock, AxisMap::IDENTITY, Config::default());
-    // Its data may be read faster than its settings.
+    // The chip's data may be read at a higher clock than its settings.
     let mut imu = imu.with_bus_clock(move |device, clock| {
         config.frequency = match clock {
             BusClock::Setup => Hertz(1_000_000),
             BusClock::Data => Hertz(20_000_000),
         };
-        // A frequency that it cannot do stays as it was.
+        // A frequency that is not supported leaves the clock unchanged.
         let _ = device.bus_mut().set_config(&config);
     });
     loop {

@@ -1,29 +1,29 @@
-//! Registers and values of the MPU-6000: InvenSense's register map RM-MPU-6000A-00 revision 4.2 ("RM") and product specification PS-MPU-6000A-00
-//! revision 3.4 ("PS").
+//! Registers and values of the MPU-6000, from InvenSense's register map RM-MPU-6000A-00 revision
+//! 4.2 ("RM") and product specification PS-MPU-6000A-00 revision 3.4 ("PS").
 
 use crate::{AccelRange, Config, Filter, GyroRange};
 
 /// Register addresses (RM 3).
 pub mod register {
-    /// The factory's answers to the self test, four registers.
+    /// Factory responses to the self test, four registers.
     pub const SELF_TEST: u8 = 0x0D;
-    /// Divider of the sample rate. The low-pass and the two ranges follow it.
+    /// Divider of the sample rate, followed by the low-pass filter and the two ranges.
     pub const SMPLRT_DIV: u8 = 0x19;
-    /// Low-pass.
+    /// Low-pass filter.
     pub const CONFIG: u8 = 0x1A;
     /// Gyroscope: self test and range.
     pub const GYRO_CONFIG: u8 = 0x1B;
     /// Accelerometer: self test and range.
     pub const ACCEL_CONFIG: u8 = 0x1C;
-    /// Interrupt status, the first of those that may be read fast.
+    /// Interrupt status; first register that may be read at the fast clock.
     pub const INT_STATUS: u8 = 0x3A;
     /// Accelerometer x, y, z, temperature, gyroscope x, y, z, high byte first.
     pub const ACCEL_XOUT_H: u8 = 0x3B;
-    /// The last of the data.
+    /// Last register of the data.
     pub const GYRO_ZOUT_L: u8 = 0x48;
-    /// Resets of the signal paths.
+    /// Reset of the signal paths.
     pub const SIGNAL_PATH_RESET: u8 = 0x68;
-    /// Switches of the interfaces.
+    /// Configuration of the interfaces.
     pub const USER_CTRL: u8 = 0x6A;
     /// Reset, sleep, clock.
     pub const PWR_MGMT_1: u8 = 0x6B;
@@ -31,21 +31,24 @@ pub mod register {
     pub const WHO_AM_I: u8 = 0x75;
 }
 
-/// What [`register::WHO_AM_I`] reads, on SPI as well (RM 4.34).
+/// Value of [`register::WHO_AM_I`], also on SPI (RM 4.34).
 pub const IDENTITY: u8 = 0x68;
-/// PWR_MGMT_1: DEVICE_RESET, bit 7 (RM 4.30). Not 0x08, which is TEMP_DIS: it switches the thermometer off, wakes the chip, and resets nothing.
+/// PWR_MGMT_1: DEVICE_RESET, bit 7 (RM 4.30). Not 0x08, which is TEMP_DIS: it disables the
+/// thermometer and wakes the chip without a reset.
 pub const RESET: u8 = 0x80;
-/// PWR_MGMT_1: awake, thermometer on, clock from the gyroscope's z axis, which is steadier than the internal one (RM 4.30).
+/// PWR_MGMT_1: awake, thermometer on, clock from the gyroscope's z axis, which is more stable than
+/// the internal oscillator (RM 4.30).
 pub const AWAKE: u8 = 0x03;
 /// SIGNAL_PATH_RESET: gyroscope, accelerometer, thermometer (RM 4.27).
 pub const ALL_PATHS: u8 = 0x07;
-/// USER_CTRL: I2C_IF_DIS. What others say on the bus must not be taken for I2C (RM 4.29).
+/// USER_CTRL: I2C_IF_DIS, so that the chip does not take traffic for other devices as I2C (RM
+/// 4.29).
 pub const SPI_ONLY: u8 = 0x10;
 /// Self test of x, y and z, in GYRO_CONFIG and in ACCEL_CONFIG (RM 4.4, 4.5).
 pub const TEST_ALL: u8 = 0xE0;
 
 impl AccelRange {
-    /// The register's value.
+    /// The value of the register.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -69,7 +72,7 @@ impl AccelRange {
 }
 
 impl GyroRange {
-    /// The register's value.
+    /// The value of the register.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -93,7 +96,7 @@ impl GyroRange {
 }
 
 impl Filter {
-    /// The register's value.
+    /// The value of the register.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -107,7 +110,7 @@ impl Filter {
         }
     }
 
-    /// The larger of the two bandwidths, Hz (RM 4.3).
+    /// The larger bandwidth of the two sensors, Hz (RM 4.3).
     #[must_use]
     pub const fn bandwidth(self) -> u64 {
         match self {
@@ -121,7 +124,8 @@ impl Filter {
         }
     }
 
-    /// Samples of the gyroscope a second, before the divider (RM 4.2). The accelerometer has 1000 with each.
+    /// Sample rate of the gyroscope before the divider, Hz (RM 4.2). The accelerometer always has
+    /// 1000 Hz.
     #[must_use]
     pub const fn rate(self) -> u64 {
         match self {
@@ -137,7 +141,8 @@ pub const fn settings(config: &Config) -> [u8; 4] {
     [config.divider, config.filter.code(), config.gyro_range.code(), config.accel_range.code()]
 }
 
-/// Does the low-pass leave nothing above half the rate, of the chip's samples and of those that are delivered?
+/// Whether the low-pass filter prevents aliasing, both at the chip's sample rate and at the rate of
+/// the driver's samples.
 #[must_use]
 pub const fn is_sampled_often_enough(config: &Config) -> bool {
     let chip = config.filter.rate() / (config.divider as u64 + 1);
@@ -146,7 +151,7 @@ pub const fn is_sampled_often_enough(config: &Config) -> bool {
     chip >= least && interval > 0 && interval * least <= 1_000_000
 }
 
-/// One burst of the data.
+/// The data burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// Accelerometer x, y, z, counts.
@@ -158,7 +163,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Takes the burst apart; `None` when no chip that is awake drives the bus: every byte the same, all ones or all zeros.
+    /// Decodes the burst. `None` when no awake chip drives the bus: all bytes ones or all zeros.
     #[must_use]
     pub fn decode(burst: &[u8; 14]) -> Option<Self> {
         if *burst == [0xFF; 14] || *burst == [0; 14] {
@@ -179,16 +184,19 @@ impl Sample {
     }
 }
 
-/// The factory's answers to the self test, in counts at ±8 g and ±250 °/s: accelerometer x, y, z, gyroscope x, y, z (RM 4.1). Zero where the
-/// factory has measured nothing.
+/// Factory responses to the self test, in counts at ±8 g and ±250 °/s: accelerometer x, y, z,
+/// gyroscope x, y, z (RM 4.1). Zero where the factory has stored none.
 #[must_use]
 pub fn factory_answers(registers: [u8; 4]) -> [f32; 6] {
     let [x, y, z, rest] = registers;
+    // A code of the accelerometer has five bits: the upper three are in the register of the axis,
+    // the lower two in the last register.
     let accel = [x >> 5 << 2 | rest >> 4 & 3, y >> 5 << 2 | rest >> 2 & 3, z >> 5 << 2 | rest & 3];
     let gyro = [x & 0x1F, y & 0x1F, z & 0x1F];
-    // (0.92 / 0.34)^(1/30); the exponents are whole numbers.
+    // The factor is (0.92 / 0.34)^(1/30); the exponents are integers.
     let [ax, ay, az] = accel.map(|code| grown(4096.0 * 0.34, 1.033_736, code));
     let [gx, gy, gz] = gyro.map(|code| grown(25.0 * 131.0, 1.046, code));
+    // The factory response of the gyroscope's y axis is negative (RM 4.1).
     [ax, ay, az, gx, -gy, gz]
 }
 
@@ -199,7 +207,8 @@ fn grown(first: f32, factor: f32, code: u8) -> f32 {
     }
 }
 
-/// Is each answer within 14 % of the factory's (RM 4.1; PS 6.1, 6.2)? One that the factory has not measured has to be there.
+/// Whether each response is within 14 % of the factory's (RM 4.1; PS 6.1, 6.2). Without a factory
+/// value, a response of more than 100 counts passes.
 #[must_use]
 pub fn passes_self_test(answers: &[f32; 6], factory: &[f32; 6]) -> bool {
     answers.iter().zip(factory).all(|(answer, factory)| {
@@ -241,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_factorys_answers_are_those_of_the_formulas() {
-        // Accelerometer 1, 16, 31; gyroscope 1, 16, 31.
+        // Accelerometer codes 1, 16, 31; gyroscope codes 1, 16, 31.
         let registers = [0b000_00001, 0b100_10000, 0b111_11111, 0b00_01_00_11];
         let [ax, ay, az, gx, gy, gz] = factory_answers(registers);
         assert_eq!((ax, gx), (1392.64, 3275.0));

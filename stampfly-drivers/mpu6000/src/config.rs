@@ -1,8 +1,9 @@
-//! What an MPU-6000 is told: ranges, low-pass, rate. How the registers say it is in [`codec`](super::codec).
+//! Configuration of an MPU-6000: ranges, low-pass filter, rate. The register codes are in
+//! [`codec`](super::codec).
 
 use stampfly_types::Duration;
 
-/// What the chip is told to do.
+/// Configuration of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
@@ -10,17 +11,20 @@ pub struct Config {
     pub accel_range: AccelRange,
     /// Full scale of the gyroscope.
     pub gyro_range: GyroRange,
-    /// The chip's own low-pass.
+    /// Low-pass filter of the chip.
     pub filter: Filter,
-    /// The chip measures at 8 kHz with [`Filter::Hz256`] and at 1 kHz with the others, divided by this and one (SMPLRT_DIV).
+    /// Divider of the chip's sample rate, less one (SMPLRT_DIV). The undivided rate is 8 kHz with
+    /// [`Filter::Hz256`] and 1 kHz with all others.
     pub divider: u8,
-    /// Time between two samples as delivered. The newest of the chip's is taken; those in between are skipped, which the low-pass has to allow:
-    /// `start` refuses an interval in which its bandwidth turns more than half a period.
+    /// Time between two samples returned by the driver. It returns the chip's newest sample and
+    /// skips those before, which requires a low-pass filter: `start` refuses an interval longer
+    /// than half a period of the filter's bandwidth.
     pub interval: Duration,
 }
 
 impl Default for Config {
-    /// ±16 g, ±2000 °/s, 256 Hz, 8 kHz in the chip, 4 kHz delivered: what an acrobatic quadrotor uses.
+    /// ±16 g, ±2000 °/s, 256 Hz, 8 kHz in the chip, 4 kHz returned: the rates of an acrobatic
+    /// quadrotor.
     fn default() -> Self {
         Self {
             accel_range: AccelRange::G16,
@@ -54,7 +58,8 @@ pub enum GyroRange {
     Dps2000,
 }
 
-/// Bandwidth of the low-pass, by the gyroscope's; the accelerometer's is nearly the same. It delays by about 1, 2, 3, 5, 8, 13 and 19 ms (RM 4.3).
+/// Bandwidth of the low-pass filter for the gyroscope; the accelerometer's is nearly the same. The
+/// delays are about 1, 2, 3, 5, 8, 13 and 19 ms (RM 4.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]

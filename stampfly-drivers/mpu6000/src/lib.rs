@@ -20,41 +20,47 @@ use stampfly_types::{GRAVITY, Vec3};
 pub use wires::BusClock;
 use wires::Clocked;
 
-/// From power-on to the first access, at most (PS 6.3), and after each of the two resets (RM 4.30).
+/// Maximum time from power-on to the first access (PS 6.3), and the pause after each of the two
+/// resets (RM 4.30).
 const START_UP: Duration = Duration::from_millis(100);
-/// The gyroscope's first good sample after waking, 30 ms (PS 6.1), with a margin. The clock that it drives takes 10 ms of it (PS 6.6).
+/// Time from waking to valid gyroscope data, 30 ms (PS 6.1), with a margin. It includes the 10 ms
+/// in which the clock derived from the gyroscope starts (PS 6.6).
 const GYRO_START: Duration = Duration::from_millis(50);
-/// How often a chip is asked to wake, and how long after each.
+/// Number of attempts to wake the chip, and the pause after each.
 const WAKES: u8 = 5;
 const WAKE: Duration = Duration::from_millis(5);
-/// How often a chip that runs is asked whether it still holds what it was told.
+/// Period of the check that a running chip still holds its settings.
 const WITNESS_INTERVAL: Duration = Duration::from_secs(1);
-/// So long all seven values may be the same. One axis's noise alone is about a count at ±2000 °/s (PS 6.1), and there are some hundred independent
-/// samples in it.
+/// Longest time for which all seven values may stay equal. The noise of one axis alone is about one
+/// count at ±2000 °/s (PS 6.1), and this time contains about a hundred independent samples.
 const FROZEN: Duration = Duration::from_millis(200);
-/// The self test: time to settle after a change, and samples of each state, 1 ms apart.
+/// Self test: settling time after a change, and number of samples per state, 1 ms apart.
 const SETTLE: Duration = Duration::from_millis(50);
 const TEST_SAMPLES: u16 = 100;
-/// How often in a row a burst may be nothing at all before the chip is asked what is wrong.
+/// Number of consecutive bursts without data after which the driver checks the chip's state.
 const ATTEMPTS: u8 = 2;
 
 /// The driver, on SPI in mode 0 or 3. Implements [`Imu`].
 ///
-/// The chip's axes are those that the product specification draws ("orientation of axes"): a right-handed frame with z out of the top of the package, so
-/// that it measures +1 g along z when it lies still. [`AxisMap`] turns them to the body's. A board that is turned by less than a right angle is
-/// for the vehicle to correct.
+/// The chip's axes are those of the product specification ("orientation of axes"): a right-handed
+/// frame with z out of the top of the package. At rest on a level surface the chip measures +1 g
+/// along z. [`AxisMap`] turns the axes to the body's. Mounting angles other than multiples of 90°
+/// are to be corrected by the vehicle.
 ///
-/// `Sample::at` is when the chip was selected, which is when it copied its data. What it copies is one of its own periods old at most (125 µs at 8 kHz),
-/// plus the delay of its low-pass, 1 ms with [`Filter::Hz256`]; neither is taken off. **The accelerometer has 1000 samples a second, whatever is
-/// asked for**: at 4 kHz each of them comes four times.
+/// `Sample::at` is the instant of the chip select, at which the chip latches its data. The data is
+/// at most one sample period of the chip old (125 µs at 8 kHz), plus the delay of the low-pass
+/// filter, 1 ms with [`Filter::Hz256`]; neither is subtracted. **The accelerometer always samples
+/// at 1000 Hz**: at 4 kHz each of its samples is returned four times.
 ///
-/// A reader that comes late gets the newest sample, and the rhythm goes on from there. `accel_peak` is zero: not known.
+/// A caller that is late gets the newest sample, and the schedule continues from there.
+/// `accel_peak` is zero, which means unknown.
 ///
-/// A chip that restarted sleeps, and all its data are zero: such a burst is no sample. It is read again, and then the chip is asked.
-/// [`ChipError::Restarted`] is one that does not hold what it was told, which is also asked once a second; the next call sets it up again. The same
-/// values for 0.2 s are [`ChipError::NoSample`].
+/// A chip that restarted is asleep and all its data are zero. Such a burst is not returned as a
+/// sample: the driver reads again and then checks the chip. A chip that does not hold its settings,
+/// which the driver also checks once a second, is [`ChipError::Restarted`], and the next call sets
+/// it up again. Values that stay equal for 0.2 s are [`ChipError::NoSample`].
 ///
-/// A sample costs 15 bytes: 6 µs of bus at 20 MHz, 120 µs at 1 MHz.
+/// A sample is 15 bytes on the bus: 6 µs at 20 MHz, 120 µs at 1 MHz.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::Clock;
@@ -66,7 +72,7 @@ const ATTEMPTS: u8 = 2;
 /// # use stampfly_sim::time::block_on;
 /// use stampfly_mpu6000::{Axis, AxisMap, Config, Imu, Mpu6000};
 ///
-/// // x of the chip to the right, y forward, z up.
+/// // The chip's x axis points right, y forward, z up.
 /// let axes = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 /// let mut imu = Mpu6000::new(device, clock, axes, Config::default());
 /// # let next = imu.next();
@@ -82,33 +88,35 @@ pub struct Mpu6000<S, T, F = fn(&mut S, BusClock)> {
     axes: AxisMap,
     config: Config,
     running: bool,
-    /// When the next sample is to be read.
+    /// Time of the next read.
     due: Instant,
-    /// When to ask next whether the chip restarted.
+    /// Time of the next check for a restart.
     witness: Instant,
-    /// The shortest time a burst took: the bus alone, without waiting for it.
+    /// Shortest duration of a burst: the transfer alone, without waiting for the bus.
     on_bus: Duration,
-    /// The last burst, and since when it has been the same.
+    /// The last burst, and the time since which it has been the same.
     last: Option<(codec::Sample, Instant)>,
 }
 
 impl<S: SpiDevice, T: Timebase> Mpu6000<S, T> {
-    /// A driver of the chip on this device, whose clock stays as it is: 1 MHz at most.
+    /// A driver of the chip on this device, with the device's fixed bus clock of at most 1 MHz.
     pub fn new(device: S, clock: T, axes: AxisMap, config: Config) -> Self {
         Self::assembled(Clocked::new(device, |_, _| ()), clock, TransferLimit::SPI, axes, config)
     }
 
-    /// The same, with a function that changes the bus's clock for this chip. It is called before the transfer, and only when it changes.
+    /// Adds a function that changes the bus clock for this chip. The driver calls it before a
+    /// transfer that needs another clock than the previous one.
     ///
-    /// `SpiDevice` knows no clock: it is the device's own, and every layer changes it in its own way, such as `set_config` of Embassy's
-    /// `SpiDeviceWithConfig`, or `bus_mut` of `ExclusiveDevice`. A function of the device fits all of them; two devices with one chip select would need a
-    /// cell around the pin.
+    /// `SpiDevice` has no method for the clock, and each layer changes it in its own way, such as
+    /// `set_config` of Embassy's `SpiDeviceWithConfig` or `bus_mut` of `ExclusiveDevice`. A
+    /// function of the device fits all of them. The alternative, two devices with one chip select,
+    /// would need a cell around the pin.
     ///
     /// ```
     /// use stampfly_mpu6000::embedded_hal_async::spi::SpiDevice;
     /// use stampfly_mpu6000::{AxisMap, BusClock, Config, Imu, Mpu6000, Timebase};
     ///
-    /// /// Stands for a layer's device whose clock can be changed.
+    /// /// A layer's device whose clock can be changed.
     /// trait Changeable {
     ///     fn set_frequency(&mut self, hertz: u32);
     /// }
@@ -152,15 +160,17 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         self
     }
 
-    /// Takes the driver apart: the device and the clock. The chip goes on measuring.
+    /// Takes the driver apart and returns the device and the clock. The chip continues to measure.
     pub fn release(self) -> (S, T) {
         self.port.release()
     }
 
-    /// Sets the chip up: identification, reset, reset of the signal paths, clock, ranges, low-pass, which it reads back. 250 ms.
+    /// Sets the chip up: identification, reset, reset of the signal paths, clock, ranges and
+    /// low-pass filter, with read-back. 250 ms.
     ///
     /// # Errors
-    /// Another chip, a configuration that cannot be or was not kept, the bus.
+    /// [`ChipError::Identification`], [`ChipError::InvalidConfiguration`],
+    /// [`ChipError::Configuration`] when a setting was not kept, and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<S::Error>> {
         self.running = false;
         if !codec::is_sampled_often_enough(&self.config) {
@@ -174,9 +184,9 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         Ok(())
     }
 
-    /// Deflects both sensors' masses and compares with what the factory has measured (RM 4.1). 0.65 s; the vehicle has to stand still.
-    ///
-    /// Leaves the chip to be set up by the next call.
+    /// Deflects the proof masses of both sensors and compares the responses with the factory's (RM
+    /// 4.1). Takes 0.65 s, during which the vehicle must not move. The next call sets the chip up
+    /// again.
     ///
     /// # Errors
     /// [`ChipError::SelfTest`], and those of [`start`](Self::start).
@@ -195,12 +205,12 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         if codec::passes_self_test(&answers, &factory) { Ok(()) } else { Err(ChipError::SelfTest) }
     }
 
-    /// From any state to samples with these settings.
+    /// Resets the chip from any state and applies these settings.
     async fn set_up(&mut self, settings: [u8; 4]) -> Result<(), ChipError<S::Error>> {
         self.port.wait_until(Instant::ZERO + START_UP).await;
         let [mut found]: [u8; 1] = self.port.read(register::WHO_AM_I).await?;
         if found != codec::IDENTITY {
-            // It may be in a reset that the program before this one began.
+            // The program before this one may have started a reset that is still in progress.
             self.port.wait(START_UP).await;
             [found] = self.port.read(register::WHO_AM_I).await?;
         }
@@ -209,12 +219,14 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         }
         self.port.write(register::PWR_MGMT_1, &[codec::RESET]).await?;
         self.port.wait(START_UP).await;
-        // On SPI both resets belong together (RM 4.30).
+        // On SPI the device reset must be followed by a reset of the signal paths (RM 4.30).
         self.port.write(register::SIGNAL_PATH_RESET, &[codec::ALL_PATHS]).await?;
         self.port.wait(START_UP).await;
+        // The reset has enabled I2C again.
         self.port.write(register::USER_CTRL, &[codec::SPI_ONLY]).await?;
         self.wake().await?;
         self.port.write(register::SMPLRT_DIV, &settings).await?;
+        // Time for the gyroscope to start, which is also the clock source now.
         self.port.wait(GYRO_START).await;
         let kept: [u8; 4] = self.port.read(register::SMPLRT_DIV).await?;
         if let Some((kept, _)) = kept.into_iter().zip(settings).find(|(kept, wanted)| kept != wanted) {
@@ -224,7 +236,8 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         if power == codec::AWAKE { Ok(()) } else { Err(ChipError::Configuration { status: power }) }
     }
 
-    /// Some chips stay asleep at the first request after a reset: public reports of it, and programs that ask again.
+    /// Wakes the chip, with several attempts: public reports describe chips that stay asleep at the
+    /// first request after a reset.
     async fn wake(&mut self) -> Result<(), ChipError<S::Error>> {
         let mut power = 0;
         for _ in 0..WAKES {
@@ -238,7 +251,7 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         Err(ChipError::Configuration { status: power })
     }
 
-    /// Accelerometer and gyroscope, counts, after a change.
+    /// Mean of accelerometer and gyroscope, counts, after settling.
     async fn mean(&mut self) -> Result<[f32; 6], ChipError<S::Error>> {
         self.port.wait(SETTLE).await;
         let mut sums = [0_i32; 6];
@@ -250,7 +263,7 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         Ok(sums.map(|sum| sum as f32 / f32::from(TEST_SAMPLES)))
     }
 
-    /// A sample, and when the chip was selected for it.
+    /// A sample, and the instant of the chip select.
     async fn burst(&mut self) -> Result<(codec::Sample, Instant), ChipError<S::Error>> {
         for _ in 0..ATTEMPTS {
             let asked = self.port.now();
@@ -263,17 +276,18 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Mpu6000<S, T, F> {
         }
         self.running = false;
         let [power]: [u8; 1] = self.port.read(register::PWR_MGMT_1).await?;
+        // An awake chip without data is a fault of the bus; a sleeping one has restarted.
         Err(if power == 0xFF || power == codec::AWAKE { ChipError::Data } else { ChipError::Restarted })
     }
 
-    /// Has the chip lost what it was told?
+    /// Checks that the chip still holds its settings.
     async fn check(&mut self) -> Result<(), ChipError<S::Error>> {
         if self.port.now() < self.witness {
             return Ok(());
         }
         let settings = codec::settings(&self.config);
         for _ in 0..2 {
-            // Twice, before a wrong bit on the bus costs a start.
+            // Two reads, so that one wrong bit on the bus does not cause a new set-up.
             if self.port.read(register::SMPLRT_DIV).await? == settings {
                 self.witness = self.port.now() + WITNESS_INTERVAL;
                 return Ok(());
@@ -294,11 +308,13 @@ impl<S: SpiDevice, T: Timebase, F: FnMut(&mut S, BusClock)> Imu for Mpu6000<S, T
         self.check().await?;
         self.port.wait_until(self.due).await;
         let (sample, at) = self.burst().await?;
-        // From the plan, unless that is over as well.
+        // Keeps the schedule, unless the next planned time has passed as well.
         let planned = self.due + self.config.interval;
         self.due = if planned > at { planned } else { at + self.config.interval };
         match self.last {
             Some((last, since)) if last == sample => {
+                // Noise alone changes the values; equal ones come from a chip that has stopped
+                // sampling.
                 if at.since(since) > FROZEN {
                     self.running = false;
                     return Err(ChipError::NoSample);

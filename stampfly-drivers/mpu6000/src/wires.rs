@@ -1,10 +1,10 @@
-//! Registers on SPI with two clocks: one for the data, one for everything else.
+//! Register access on SPI with two bus clocks: a fast one for data, a slow one for everything else.
 
 use crate::codec::register;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 use stampfly_driver_core::chip::{Registers, TransferLimit, Wires};
 
-/// A clock of the bus for this chip (PS 6.5).
+/// Bus clock for a transfer with this chip (PS 6.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BusClock {
@@ -14,12 +14,12 @@ pub enum BusClock {
     Data,
 }
 
-/// The device, and how its clock is changed.
+/// The device, and the function that changes its clock.
 #[derive(Debug)]
 pub(crate) struct Clocked<S, F> {
     device: S,
     change: F,
-    /// The last one that was asked for.
+    /// The clock of the last transfer.
     clock: Option<BusClock>,
 }
 

@@ -1,4 +1,5 @@
-//! Two nRF24L01+, emulated down to their registers, on this PC: one sends through air that loses three of ten packets, the other listens.
+//! Runs the driver on register-level emulations of two nRF24L01+ on this PC. One sends over the
+//! air, which loses three of ten packets, and the other receives.
 //!
 //! `cargo run -p stampfly-nrf24l01 --example emulated-nrf24l01`, in the repository.
 

@@ -1,8 +1,11 @@
-//! An nRF24L01+ on an ESP32-C6, without an executor: SCK at GPIO18, SDI at GPIO19, SDO at GPIO20, chip select at GPIO21, CE at GPIO22. Shows what somebody sends on channel 40
-//! on the serial port.
+//! An nRF24L01+ on an ESP32-C6 without an executor. Prints the packets received on channel 40 on
+//! the serial port.
 //!
-//! `stampfly-drivers/boards/esp32` has the versions of the crates and the linker's settings: `cargo run --release --example nrf24l01` there. On
-//! another ESP32 only the pins' names change.
+//! Wiring: SCK GPIO18, SDI GPIO19, SDO GPIO20, chip select GPIO21, CE GPIO22.
+//!
+//! Build it in `stampfly-drivers/boards/esp32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example nrf24l01`. On another ESP32 only the names of
+//! the pins differ.
 
 #![no_std]
 #![no_main]
@@ -20,7 +23,8 @@ use stampfly_nrf24l01::{Config, Duration, Instant, Nrf24l01, Tuning};
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
-/// Where somebody sends ten bytes at 1 Mbit/s, with two bytes of CRC and without acknowledgement.
+/// Settings of the transmitter: ten bytes at 1 Mbit/s, with a CRC of two bytes and without
+/// acknowledgement.
 const TUNING: Tuning = Tuning { channel: 40, address: [1, 2, 3, 4, 5] };
 
 #[esp_hal::main]

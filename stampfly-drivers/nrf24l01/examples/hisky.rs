@@ -1,4 +1,5 @@
-//! HiSKY's receiver on this driver: the lines that a vehicle writes to join the two, and a transmitter on a second emulated radio.
+//! A HiSKY receiver on this driver, with the code that a vehicle needs to combine the two, and a
+//! transmitter on a second emulated radio.
 //!
 //! `cargo run -p stampfly-nrf24l01 --example emulated-hisky`, in the repository.
 
@@ -11,7 +12,7 @@ use stampfly_sim::chips::{self, Air, ChipEnable, SpiBus, SpiPort};
 use stampfly_sim::time::{Clock, Tasks};
 use std::cell::Cell;
 
-/// The protocol, with what the vehicle takes of it.
+/// The protocol, and the sticks that the vehicle takes from it.
 struct Receiver {
     hisky: HiskyReceiver,
     sticks: Option<HiskyChannels>,
@@ -42,7 +43,7 @@ impl Hopper<PAYLOAD> for Receiver {
 
 type Radio = Nrf24l01<SpiPort<chips::Nrf24l01>, ChipEnable, Clock>;
 
-/// The receiver's task. It looks up every 20 ms.
+/// Task of the receiver, with a chance for other work every 20 ms.
 async fn receive(mut radio: Radio, clock: Clock, packets: &Cell<u32>) {
     let mut receiver = Receiver { hisky: HiskyReceiver::new(None, clock.now()), sticks: None };
     loop {
@@ -52,7 +53,7 @@ async fn receive(mut radio: Radio, clock: Clock, packets: &Cell<u32>) {
         }
         packets.set(receiver.hisky.packets());
         if receiver.hisky.is_offline(clock.now()) {
-            // What the sticks said last is not what the pilot wants.
+            // Stick positions of a lost link must not be used.
             receiver.sticks = None;
         } else if let Some(sticks) = receiver.sticks
             && receiver.hisky.packets().is_multiple_of(100)
@@ -62,7 +63,8 @@ async fn receive(mut radio: Radio, clock: Clock, packets: &Cell<u32>) {
     }
 }
 
-/// A transmitter that has just been switched on: it binds for a second, a packet in the middle of each of its frames.
+/// A transmitter that has just been switched on: it binds for a second, with a bind packet in the
+/// middle of each frame.
 async fn transmit(mut radio: Radio, clock: Clock) {
     let link = HiskyLink { address: [1, 2, 3, 4, 5], hops: core::array::from_fn(|hop| 2 + 3 * hop as u8) };
     radio.start().await.expect("it starts");

@@ -1,7 +1,10 @@
-//! An nRF24L01+ on a computer with Linux, such as a Raspberry Pi: on SPI at `/dev/spidev0.0`, CE at GPIO 22. Shows
-//! what somebody sends on channel 40.
+//! An nRF24L01+ on a computer with Linux, such as a Raspberry Pi. Prints the packets received on
+//! channel 40.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example nrf24l01` there.
+//! Wiring: SPI at `/dev/spidev0.0`, CE at GPIO 22.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example nrf24l01`.
 
 use linux_embedded_hal::gpio_cdev::{Chip, LineRequestFlags};
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
@@ -10,7 +13,8 @@ use stampfly_nrf24l01::blocking::{Blocking, BlockingClock, block_on};
 use stampfly_nrf24l01::{Config, Duration, Instant, Nrf24l01, Tuning};
 use std::error::Error;
 
-/// Where somebody sends ten bytes at 1 Mbit/s, with two bytes of CRC and without acknowledgement.
+/// Settings of the transmitter: ten bytes at 1 Mbit/s, with a CRC of two bytes and without
+/// acknowledgement.
 const TUNING: Tuning = Tuning { channel: 40, address: [1, 2, 3, 4, 5] };
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,7 +1,10 @@
-//! An nRF24L01+ on a Raspberry Pi Pico 2: SCK at GP18, SDI at GP19, SDO at GP16, chip select at GP17, CE at GP20, IRQ at GP21. Shows what somebody sends on channel 40
-//! through the debug probe.
+//! An nRF24L01+ on a Raspberry Pi Pico 2. Prints the packets received on channel 40 through the
+//! debug probe.
 //!
-//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example nrf24l01` there.
+//! Wiring: SCK GP18, SDI GP19, SDO GP16, chip select GP17, CE GP20, IRQ GP21.
+//!
+//! Build it in `stampfly-drivers/boards/rp2350`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example nrf24l01`.
 
 #![no_std]
 #![no_main]
@@ -22,7 +25,8 @@ bind_interrupts!(struct Interrupts {
     DMA_IRQ_0 => dma::InterruptHandler<DMA_CH0>, dma::InterruptHandler<DMA_CH1>;
 });
 
-/// Where somebody sends ten bytes at 1 Mbit/s, with two bytes of CRC and without acknowledgement.
+/// Settings of the transmitter: ten bytes at 1 Mbit/s, with a CRC of two bytes and without
+/// acknowledgement.
 const TUNING: Tuning = Tuning { channel: 40, address: [1, 2, 3, 4, 5] };
 
 #[embassy_executor::main]

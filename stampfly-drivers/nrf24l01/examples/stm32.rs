@@ -1,7 +1,10 @@
-//! An nRF24L01+ on an STM32F411 (a "Black Pill"): SCK at PA5, SDI at PA7, SDO at PA6, chip select at PA4, CE at PA3. Shows what somebody sends on channel 40
-//! through the debug probe.
+//! An nRF24L01+ on an STM32F411 ("Black Pill"). Prints the packets received on channel 40 through
+//! the debug probe.
 //!
-//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example nrf24l01` there.
+//! Wiring: SCK PA5, SDI PA7, SDO PA6, chip select PA4, CE PA3.
+//!
+//! Build it in `stampfly-drivers/boards/stm32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example nrf24l01`.
 
 #![no_std]
 #![no_main]
@@ -24,7 +27,8 @@ bind_interrupts!(struct Interrupts {
     DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
 });
 
-/// Where somebody sends ten bytes at 1 Mbit/s, with two bytes of CRC and without acknowledgement.
+/// Settings of the transmitter: ten bytes at 1 Mbit/s, with a CRC of two bytes and without
+/// acknowledgement.
 const TUNING: Tuning = Tuning { channel: 40, address: [1, 2, 3, 4, 5] };
 
 #[embassy_executor::main]

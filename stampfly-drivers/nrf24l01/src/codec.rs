@@ -1,71 +1,76 @@
-//! Commands, registers and values of the nRF24L01+, from Nordic's product specification 1.0 of September 2008. Where the nRF24L01 before it
-//! differs, from its product specification 2.0 of July 2007.
+//! Commands, registers and values of the nRF24L01+, from Nordic's product specification 1.0
+//! (September 2008), and differences of the older nRF24L01, from its product specification 2.0
+//! (July 2007).
 
 use crate::{AddressBytes, Checksum, Config, Power, Rate};
 
-/// Commands (8.3.1, table 20). A register is read by its address and written by its address with [`WRITE`](command::WRITE) set.
+/// Commands (8.3.1, table 20). A register is read with its address as command, and written with its
+/// address and [`WRITE`](command::WRITE).
 pub mod command {
-    /// Writes the register whose address is in the lower five bits. Only in power down and in standby.
+    /// Writes the register whose address is in the lower five bits. Allowed only in power down and
+    /// standby.
     pub const WRITE: u8 = 0x20;
-    /// Reads the first received payload, which is gone then.
+    /// Reads the oldest received payload and removes it.
     pub const R_RX_PAYLOAD: u8 = 0x61;
-    /// Stores a payload that is to be sent.
+    /// Stores a payload for sending.
     pub const W_TX_PAYLOAD: u8 = 0xA0;
-    /// Empties the FIFO of payloads to be sent.
+    /// Empties the send FIFO.
     pub const FLUSH_TX: u8 = 0xE1;
-    /// Empties the FIFO of received payloads.
+    /// Empties the receive FIFO.
     pub const FLUSH_RX: u8 = 0xE2;
 }
 
 /// Register addresses (9.1, table 28).
 pub mod register {
-    /// Masks, CRC, power, direction.
+    /// Interrupt masks, CRC, power, direction.
     pub const CONFIG: u8 = 0x00;
-    /// Pipes that acknowledge.
+    /// Pipes with automatic acknowledgement.
     pub const EN_AA: u8 = 0x01;
-    /// Pipes that are listened to.
+    /// Enabled receive pipes.
     pub const EN_RXADDR: u8 = 0x02;
-    /// Bytes of an address, less 2.
+    /// Length of an address in bytes, less 2.
     pub const SETUP_AW: u8 = 0x03;
-    /// Retransmission.
+    /// Automatic retransmission.
     pub const SETUP_RETR: u8 = 0x04;
     /// Channel.
     pub const RF_CH: u8 = 0x05;
-    /// Rate and power.
+    /// Data rate and power.
     pub const RF_SETUP: u8 = 0x06;
-    /// What happened; a one clears the flag in its place.
+    /// Status flags; writing a one clears a flag.
     pub const STATUS: u8 = 0x07;
-    /// Is there a carrier (6.4)? The nRF24L01 calls it CD.
+    /// Carrier detection (6.4). Called CD on the nRF24L01.
     pub const RPD: u8 = 0x09;
-    /// The address of pipe 0.
+    /// Address of pipe 0.
     pub const RX_ADDR_P0: u8 = 0x0A;
-    /// The address that is sent to.
+    /// Address of sent packets.
     pub const TX_ADDR: u8 = 0x10;
-    /// Bytes of a payload in pipe 0.
+    /// Length of a payload in pipe 0, bytes.
     pub const RX_PW_P0: u8 = 0x11;
-    /// Pipes whose packets say their length.
+    /// Pipes with payloads of variable length.
     pub const DYNPD: u8 = 0x1C;
-    /// Features. Of the nRF24L01, this and [`DYNPD`] are locked, and read as zero, until a command `ACTIVATE` that the nRF24L01+ does not have; the
-    /// driver wants both zero, so it needs neither the command nor to know which part it is.
+    /// Optional features. On the nRF24L01, this register and [`DYNPD`] are locked, and read as
+    /// zero, until a command `ACTIVATE` that the nRF24L01+ does not have. The driver needs both at
+    /// zero, so it neither sends the command nor distinguishes the parts.
     pub const FEATURE: u8 = 0x1D;
 }
 
-/// CONFIG: powered.
+/// CONFIG: powered up.
 pub const POWERED: u8 = 0x02;
-/// CONFIG: receives, and does not send.
+/// CONFIG: receiver instead of transmitter.
 pub const RECEIVES: u8 = 0x01;
 /// STATUS: a payload has been received.
 pub const RECEIVED: u8 = 0x40;
 /// STATUS: a payload has been sent.
 pub const SENT: u8 = 0x20;
-/// STATUS: all its flags.
+/// STATUS: all flags.
 pub const FLAGS: u8 = 0x70;
-/// The last channel (9.1, RF_CH; 6.3: at 2 Mbit/s each takes two).
+/// Highest channel (9.1, RF_CH). At 2 Mbit/s a packet occupies two channels (6.3).
 pub const LAST_CHANNEL: u8 = 125;
-/// RF_SETUP, bit 0: no matter to the nRF24L01+, the gain of the nRF24L01's receiver, a part of the power of the Si24R1.
+/// RF_SETUP, bit 0: ignored by the nRF24L01+, receiver gain of the nRF24L01, part of the power
+/// setting of the Si24R1.
 const GAIN: u8 = 0x01;
 
-/// CONFIG for a receiver that is powered: all interrupts reach the pin.
+/// CONFIG of a receiver that is powered up, with all interrupts enabled on the pin.
 #[must_use]
 pub const fn configuration(checksum: Checksum) -> u8 {
     let checksum = match checksum {
@@ -103,24 +108,26 @@ pub const fn address_bytes(bytes: AddressBytes) -> usize {
     }
 }
 
-/// Registers, their values, and which bits of them are compared when they are read back: what does not change while the driver runs.
+/// Registers with their values, and a mask of the bits that are compared at read-back. They do not
+/// change while the driver runs.
 #[must_use]
 pub const fn settings(config: &Config, payload: u8) -> [(u8, u8, u8); 8] {
     [
         (register::SETUP_AW, address_bytes(config.address_bytes) as u8 - 2, 0xFF),
-        // No pipe acknowledges and nothing is sent again: without both, packets have no control field (7.10).
+        // No acknowledgement and no retransmission: packets then have no control field (7.10).
         (register::EN_AA, 0, 0xFF),
         (register::SETUP_RETR, 0, 0xFF),
         (register::EN_RXADDR, 1, 0xFF),
         (register::RX_PW_P0, payload, 0xFF),
         (register::DYNPD, 0, 0xFF),
         (register::FEATURE, 0, 0xFF),
-        // Without the bit that is no matter, and without the one that says that the frequency is locked.
+        // Ignores the gain bit and the test bit that locks the synthesizer (PLL_LOCK).
         (register::RF_SETUP, rf_setup(config.rate, config.power), !(GAIN | 0x10)),
     ]
 }
 
-/// How long a packet is on the air, µs: preamble, address, payload, CRC (7.3), without the time until it begins.
+/// Time of a packet on the air, µs: preamble, address, payload, CRC (7.3), without the start-up of
+/// the transmitter.
 #[must_use]
 pub const fn airtime(config: &Config, payload: usize) -> u64 {
     let checksum = match config.checksum {
@@ -128,6 +135,7 @@ pub const fn airtime(config: &Config, payload: usize) -> u64 {
         Checksum::One => 1,
         Checksum::Two => 2,
     };
+    // The preamble is one byte.
     let bits = 8 * (1 + address_bytes(config.address_bytes) + payload + checksum) as u64;
     match config.rate {
         Rate::Kbit250 => 4 * bits,
@@ -144,12 +152,13 @@ pub struct Status {
     pub received: bool,
     /// A payload has been sent since the flag was cleared.
     pub sent: bool,
-    /// The pipe of the first received payload; `None` when there is none.
+    /// Pipe of the oldest received payload; `None` when there is no payload.
     pub pipe: Option<u8>,
 }
 
 impl Status {
-    /// Takes the register apart; `None` when a chip cannot say so: bit 7 is always zero, and there is no pipe 6.
+    /// Decodes the register. `None` for values that no chip returns: bit 7 is always zero, and pipe
+    /// 6 does not exist.
     #[must_use]
     pub const fn decode(status: u8) -> Option<Self> {
         let pipe = status >> 1 & 7;

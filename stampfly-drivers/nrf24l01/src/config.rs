@@ -1,25 +1,28 @@
-//! What an nRF24L01 is told: rate, power, CRC, addresses. How the registers say it is in [`codec`](super::codec).
+//! Configuration of an nRF24L01+: rate, power, CRC, addresses. The register codes are in
+//! [`codec`](super::codec).
 
 use stampfly_types::Duration;
 
-/// What the chip is told to do, the same at both ends of the link but for the power.
+/// Configuration of the chip. Both ends of a link need the same values, except for the power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// Bits per second.
+    /// Data rate.
     pub rate: Rate,
-    /// Of what is sent.
+    /// Output power.
     pub power: Power,
-    /// Bytes of the CRC. Without one, noise is received as well.
+    /// Length of the CRC. Without a CRC the chip also receives noise.
     pub checksum: Checksum,
-    /// Bytes of an address.
+    /// Length of an address.
     pub address_bytes: AddressBytes,
-    /// How often the chip is asked, where its interrupt is not wired. A packet is stamped that much late at most.
+    /// Period of status reads without an interrupt pin. The stamp of a packet is late by at most
+    /// this time.
     pub poll: Duration,
 }
 
 impl Default for Config {
-    /// 1 Mbit/s, 0 dBm, two bytes of CRC, five of address, asked ten thousand times a second: a HiSKY receiver's.
+    /// 1 Mbit/s, 0 dBm, CRC of two bytes, address of five, polled ten thousand times a second: the
+    /// settings of a HiSKY receiver.
     fn default() -> Self {
         Self {
             rate: Rate::Mbit1,
@@ -31,18 +34,18 @@ impl Default for Config {
     }
 }
 
-/// Bits per second (6.2).
+/// Data rate (6.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Rate {
-    /// The nRF24L01 without the plus does not have it: a start ends with an error there.
+    /// Not supported by the nRF24L01: `start` returns an error there.
     Kbit250,
     Mbit1,
     Mbit2,
 }
 
-/// Output power, dBm (6.5). Clones give more.
+/// Output power, dBm (6.5). Compatible parts of other makers may emit more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -53,7 +56,7 @@ pub enum Power {
     Zero,
 }
 
-/// Bytes of the CRC (7.3.5).
+/// Length of the CRC in bytes (7.3.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -63,7 +66,7 @@ pub enum Checksum {
     Two,
 }
 
-/// Bytes of an address (7.3.2).
+/// Length of an address in bytes (7.3.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -73,22 +76,24 @@ pub enum AddressBytes {
     Five,
 }
 
-/// Where a radio listens, or sends.
+/// Channel and address of received or sent packets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tuning {
-    /// 2400 MHz and so many, 0 to 125.
+    /// Frequency above 2400 MHz in MHz, 0 to 125.
     pub channel: u8,
-    /// In the order of the register: the first byte is the least significant. Of an address of three or four bytes, the first ones.
+    /// In the order of the register, least significant byte first. Shorter addresses use the first
+    /// bytes.
     pub address: [u8; 5],
 }
 
-/// A packet that was received.
+/// A received packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet<const N: usize> {
-    /// When the driver knew of it: after the packet's end by the poll, or by what the processor takes to answer the interrupt.
+    /// Time of the status read that found it. Later than the end of the packet by up to the poll
+    /// period, or by the processor's response time to the interrupt.
     pub at: stampfly_types::Instant,
-    /// What is in it.
+    /// Contents of the packet.
     pub payload: [u8; N],
 }

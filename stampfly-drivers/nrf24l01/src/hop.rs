@@ -1,11 +1,13 @@
-//! Receiving a protocol that hops: it says where, the radio listens there.
+//! Interface between the driver and receivers of frequency-hopping protocols.
 
 use crate::Tuning;
 use stampfly_types::Instant;
 
-/// A protocol that hops over channels. It is told the time and what was heard, and says where to listen; it knows of no radio.
+/// A frequency-hopping protocol. It gets the time and received packets, and chooses the channel; it
+/// does not depend on the radio.
 ///
-/// A program implements it for its protocol's receiver, one line a method, and calls [`follow`](crate::Nrf24l01::follow).
+/// A program implements this trait for the receiver of its protocol, one line per method, and calls
+/// [`follow`](crate::Nrf24l01::follow).
 ///
 /// ```
 /// use stampfly_nrf24l01::{Duration, Hopper, Instant, Tuning};
@@ -36,12 +38,12 @@ use stampfly_types::Instant;
 /// assert_eq!((scanner.tuning().channel, scanner.due()), (60, Some(Instant::from_millis(40))));
 /// ```
 pub trait Hopper<const N: usize> {
-    /// What to listen to now.
+    /// Channel and address to listen to now.
     fn tuning(&self) -> Tuning;
-    /// When to [`poll`](Self::poll) next; `None` when it stays until it hears something.
+    /// Time of the next [`poll`](Self::poll); `None` when the tuning changes only after a packet.
     fn due(&self) -> Option<Instant>;
-    /// Time has passed.
+    /// Updates the protocol to the present time.
     fn poll(&mut self, now: Instant);
-    /// A packet was heard.
+    /// Passes a received packet to the protocol.
     fn receive(&mut self, at: Instant, packet: &[u8; N]);
 }

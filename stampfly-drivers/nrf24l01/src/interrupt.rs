@@ -1,7 +1,7 @@
-//! The chip's interrupt pin, if there is one and as long as it can be trusted.
+//! The interrupt pin, which is optional.
 //!
-//! It is active low (8.5). A pin that is silent, stuck or wired elsewhere is wrong a few times and ignored from then on: the driver asks the chip
-//! instead.
+//! It is active low (8.5). A pin that stays silent, is stuck or is connected elsewhere is ignored
+//! after a few errors, and the driver polls the chip instead.
 
 use core::convert::Infallible;
 use embedded_hal::digital::ErrorType;
@@ -10,19 +10,19 @@ use stampfly_driver_core::Timebase;
 use stampfly_driver_core::chip::Port;
 use stampfly_types::{Duration, Instant};
 
-/// How often in a row the pin may be wrong.
+/// Number of consecutive errors after which the pin is ignored.
 const PATIENCE: u8 = 4;
 
-/// What the last wait was.
+/// Result of the last wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Said {
-    /// There was none, or nobody asked the pin.
+    /// No wait, or a wait without the pin.
     Nothing,
     Low,
     High,
 }
 
-/// A pin, and how often in a row it was wrong.
+/// The pin, and its number of consecutive errors.
 #[derive(Debug)]
 pub(super) struct Interrupt<P> {
     pin: Option<P>,
@@ -47,12 +47,12 @@ impl<P: Wait> Interrupt<P> {
         Self { pin: Some(pin), wrong: 0, said: Said::Nothing }
     }
 
-    /// Forgets what the pin did wrong.
+    /// Resets the error count.
     pub(super) const fn trust(&mut self) {
         (self.wrong, self.said) = (0, Said::Nothing);
     }
 
-    /// Waits for the pin until then, or for the next poll when there is none.
+    /// Waits for the pin until an instant. Without a usable pin, waits for one poll period.
     pub(super) async fn wait<R, T: Timebase>(&mut self, port: &mut Port<R, T>, until: Instant, poll: Duration) {
         match &mut self.pin {
             Some(pin) if self.wrong < PATIENCE && self.said != Said::Low => {
@@ -66,7 +66,8 @@ impl<P: Wait> Interrupt<P> {
         }
     }
 
-    /// Compares what the pin said with what the chip has. A pin that is low all the time is asked every other time only.
+    /// Compares the pin with the chip, and counts errors. After a wait that ended low the next wait
+    /// polls, so a pin that is stuck low is used only every other time.
     pub(super) const fn judge(&mut self, packet: bool) {
         match (self.said, packet) {
             (Said::Nothing, _) | (Said::High, false) => return,
@@ -79,7 +80,7 @@ impl<P: Wait> Interrupt<P> {
     }
 }
 
-/// No interrupt pin.
+/// Type of the interrupt pin when none is connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPin {}
 

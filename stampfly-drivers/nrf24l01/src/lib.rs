@@ -23,34 +23,40 @@ pub use stampfly_driver_core::{SensorError, SensorErrorKind, Timebase, blocking,
 pub use stampfly_types::{Duration, Instant};
 use wires::Commands;
 
-/// From power-on to the first access (6.1.1, figure 4: power on reset). The nRF24L01 is ready after 10.3 ms.
+/// Time from power-on to the first access (6.1.1, figure 4, power-on reset). The older nRF24L01 is
+/// ready after 10.3 ms.
 const POWER_ON: Duration = Duration::from_millis(100);
-/// From power down to standby (6.1.7, table 16, Tpd2stby): 1.5 ms with a crystal of less than 30 mH, 4.5 ms with one of 90 mH. Nobody knows which
-/// one is on a module.
+/// Time from power down to standby (6.1.7, table 16, Tpd2stby): 1.5 ms with a crystal of less than
+/// 30 mH, 4.5 ms with 90 mH. The crystal of a module is not known.
 const POWER_UP: Duration = Duration::from_millis(5);
-/// From standby to listening or sending (6.1.7, Tstby2a).
+/// Time from standby to receiving or sending (6.1.7, Tstby2a).
 const SETTLE: Duration = Duration::from_micros(130);
-/// The shortest pulse of CE that sends (6.1.7, Thce), with a margin for clocks that count whole microseconds.
+/// Minimum pulse on CE that starts sending (6.1.7, Thce), with a margin for clocks with a
+/// resolution of 1 µs.
 const PULSE: Duration = Duration::from_micros(12);
-/// From the rising CE to the next access (6.1.7, Tpece2csn).
+/// Time from the rising edge on CE to the next access (6.1.7, Tpece2csn).
 const AFTER_CE: Duration = Duration::from_micros(4);
-/// What a sender may take longer than by calculation.
+/// Tolerance of the time to send a packet.
 const SEND_MARGIN: Duration = Duration::from_micros(500);
-/// How often one call reads the status: a flag without a payload is cleared, and another packet may have come meanwhile.
+/// Maximum number of status reads per call. A flag without a payload is cleared, and another packet
+/// may have arrived meanwhile.
 const LOOKS: u8 = 3;
-/// Where the self test sends: above what Wi-Fi uses in most countries, within the band (2480 MHz).
+/// Channel and address of the self test: above the Wi-Fi channels of most countries, inside the
+/// band (2480 MHz).
 const TEST: Tuning = Tuning { channel: 80, address: [0x5A, 0xA5, 0x5A, 0xA5, 0x3C] };
 
 /// The driver, on SPI in mode 0 at up to 10 MHz, for packets of `N` bytes, 1 to 32.
 ///
-/// After [`listen`](Self::listen) the radio is deaf for 130 µs. Of what it hears, three packets wait in the chip; a fourth one is lost.
+/// The radio receives from 130 µs after [`listen`](Self::listen) on. The chip stores three received
+/// packets; a fourth one is lost.
 ///
-/// A packet is believed when the chip, asked after it, still has its configuration. So neither a line that is stuck nor a chip that restarted
-/// makes packets of zeros, which are a full throttle in some protocols. A wrong bit on the way from the chip is not noticed: the CRC ends at the
-/// radio.
+/// A packet is returned only when the chip still has its configuration after the read. A stuck data
+/// line or a chip that restarted therefore yields no packets of zeros, which are full throttle in
+/// some protocols. A wrong bit on SPI is not detected, because the CRC protects only the air link.
 ///
-/// A chip that restarted is silent and otherwise looks as before. It is asked whenever it is tuned, and whenever a wait ends without a packet:
-/// [`ChipError::Restarted`], and the next call sets it up again.
+/// A chip that restarted receives nothing, and its status does not show it. The driver therefore
+/// checks the configuration at every change of the tuning and at the end of every wait without a
+/// packet. It returns [`ChipError::Restarted`], and the next call sets the chip up again.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Clock, Pin};
@@ -85,14 +91,14 @@ pub struct Nrf24l01<S, E, T, P = NoPin, const N: usize = 10> {
     interrupt: Interrupt<P>,
     config: Config,
     running: bool,
-    /// What it listens to; `None` in standby.
+    /// Present channel and address; `None` in standby.
     tuned: Option<Tuning>,
-    /// The address in the chip.
+    /// Receive address stored in the chip; `None` when unknown.
     address: Option<[u8; 5]>,
 }
 
 impl<S: SpiDevice, E: OutputPin, T: Timebase, const N: usize> Nrf24l01<S, E, T, NoPin, N> {
-    /// A driver of the chip on this device, with this pin at its CE.
+    /// A driver of the chip on this device, with this pin connected to CE.
     pub const fn new(device: S, enable: E, clock: T, config: Config) -> Self {
         const { assert!(N > 0 && N <= 32, "a payload has 1 to 32 bytes") };
         Self {
@@ -106,7 +112,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, const N: usize> Nrf24l01<S, E, T, 
         }
     }
 
-    /// The same chip, with the pin that its IRQ is wired to. The chip drives it, low when there is a packet.
+    /// The same driver with the pin connected to IRQ. The chip drives it low when it has a packet.
     pub fn with_interrupt<P: Wait>(self, pin: P) -> Nrf24l01<S, E, T, P, N> {
         let Self { port, enable, config, running, tuned, address, .. } = self;
         Nrf24l01 { port, enable, interrupt: Interrupt::on(pin), config, running, tuned, address }
@@ -116,7 +122,8 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, const N: usize> Nrf24l01<S, E, T, 
 impl<S, E, T, P, const N: usize> Nrf24l01<S, E, T, P, N> {
     stampfly_driver_core::transfer_limit!();
 
-    /// Takes the driver apart: the device, CE, the clock, and the interrupt's pin, if it has one. The chip goes on as it is.
+    /// Takes the driver apart and returns the device, CE, the clock and the interrupt pin, if any.
+    /// The state of the chip does not change.
     pub fn release(self) -> (S, E, T, Option<P>) {
         let (device, clock) = self.port.release();
         (device, self.enable, clock, self.interrupt.release())
@@ -124,17 +131,20 @@ impl<S, E, T, P, const N: usize> Nrf24l01<S, E, T, P, N> {
 }
 
 impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<S, E, T, P, N> {
-    /// Sets the chip up: settings, which it reads back, and power. 5 ms, and not before 100 ms after power-on. The radio is in standby then.
+    /// Sets the chip up: settings with read-back, and power. Takes 5 ms, and ends at least 100 ms
+    /// after power-on. The radio is in standby afterwards.
     ///
     /// # Errors
-    /// [`ChipError::Identification`] when nobody answers: the chip has no identification, but settings that are never all zeros or all
-    /// ones. [`ChipError::Configuration`] when one was not kept, such as 250 kbit/s of a part that does not have it.
+    /// [`ChipError::Identification`] when no chip answers: it has no identification, but settings
+    /// that are never all zeros or all ones. [`ChipError::Configuration`] when a setting was not
+    /// kept, such as 250 kbit/s on a part that does not support it.
     pub async fn start(&mut self) -> Result<(), ChipError<S::Error>> {
         self.stand_by()?;
         (self.running, self.address) = (false, None);
         self.port.wait_until(Instant::ZERO + POWER_ON).await;
         let configuration = codec::configuration(self.config.checksum);
-        // A send that was dropped may still be on the air, and registers are not written then. Power down is reached from anywhere (figure 4).
+        // A send that was dropped may still be on the air, and the chip accepts no register writes
+        // then. Power down can be reached from any state (figure 4).
         self.port.write(register::CONFIG, &[configuration & !codec::POWERED]).await?;
         let settings = codec::settings(&self.config, N as u8);
         for (register, value, _) in settings {
@@ -144,7 +154,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         self.port.wait(POWER_UP).await;
         for (register, value, compared) in settings {
             let [kept]: [u8; 1] = self.port.read(register).await?;
-            // The first one says how long addresses are, 1 to 3.
+            // The first register holds the length of addresses, 1 to 3.
             if register == register::SETUP_AW && (kept == 0 || kept == 0xFF) {
                 return Err(ChipError::Identification { found: u16::from(kept) });
             }
@@ -164,11 +174,11 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         Ok(())
     }
 
-    /// Sets the chip up, has it keep an address and its inverse, and send one packet to nobody, at its lowest power. 6 ms. The radio is in
-    /// standby then.
+    /// Sets the chip up, checks that it stores an address and its inverse, and sends one packet at
+    /// the lowest power. 6 ms. The radio is in standby afterwards.
     ///
-    /// The chip has no self test of its own. That it sends says that CE, crystal and synthesizer work; whether there is an antenna, and whether
-    /// it hears, nobody can tell without another radio.
+    /// The chip has no self test of its own. A packet that is sent shows that CE, crystal and
+    /// synthesizer work. The antenna and the receiver cannot be tested without a second radio.
     ///
     /// # Errors
     /// Those of [`start`](Self::start), and [`ChipError::SelfTest`].
@@ -181,6 +191,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
                 return Err(ChipError::SelfTest);
             }
         }
+        // Low power, to disturb other radios as little as possible.
         let quiet = codec::rf_setup(self.config.rate, Power::Minus18);
         self.port.write(register::RF_SETUP, &[quiet]).await?;
         let sent = self.send(TEST, &[0; N]).await;
@@ -192,13 +203,14 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         }
     }
 
-    /// Listens to a channel and an address from 130 µs after this call on. Does nothing when it does so already.
+    /// Listens to a channel and an address, from 130 µs after this call on. Does nothing when it
+    /// already listens there.
     ///
-    /// What was received and not yet read stays when only the channel changes.
+    /// Received packets that have not been read are kept when only the channel changes.
     ///
     /// # Errors
-    /// [`ChipError::InvalidConfiguration`] for a channel that the chip does not have; those of [`start`](Self::start) when it has to start;
-    /// [`ChipError::Restarted`].
+    /// [`ChipError::InvalidConfiguration`] for a channel that does not exist; those of
+    /// [`start`](Self::start) when the chip has to be set up; [`ChipError::Restarted`].
     pub async fn listen(&mut self, tuning: Tuning) -> Result<(), ChipError<S::Error>> {
         if tuning.channel > codec::LAST_CHANNEL {
             return Err(ChipError::InvalidConfiguration);
@@ -221,14 +233,16 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         }
         self.enable(true)?;
         self.tuned = Some(tuning);
+        // SPI access directly after the edge would be too early.
         self.port.wait(AFTER_CE).await;
         Ok(())
     }
 
-    /// The first packet that waits in the chip, if there is one. None before [`listen`](Self::listen), and after an error until it is called again.
+    /// The oldest received packet, if there is one. `None` before [`listen`](Self::listen), and
+    /// after an error until the next `listen`.
     ///
     /// # Errors
-    /// [`ChipError::Data`] for a status that no chip has; [`ChipError::Restarted`].
+    /// [`ChipError::Data`] for an impossible status; [`ChipError::Restarted`].
     pub async fn receive(&mut self) -> Result<Option<Packet<N>>, ChipError<S::Error>> {
         if !self.running {
             return Ok(None);
@@ -238,7 +252,8 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
             let status = self.status().await?;
             if status.pipe.is_some() {
                 let payload = self.port.read(command::R_RX_PAYLOAD).await?;
-                // Before the check: whoever drops the call in between has not lost the flag of another packet.
+                // Before the check, so that a call dropped in between does not clear the flag of a
+                // later packet.
                 self.port.write(register::STATUS, &[codec::RECEIVED]).await?;
                 self.check().await?;
                 return Ok(Some(Packet { at, payload }));
@@ -246,14 +261,16 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
             if !status.received {
                 break;
             }
-            // A packet that was read before its flag was seen. Whatever comes while this is on the bus is seen by the next look.
+            // The packet of this flag was read earlier. A packet that arrives during this write is
+            // found by the next status read.
             self.port.write(register::STATUS, &[codec::RECEIVED]).await?;
         }
         Ok(None)
     }
 
-    /// Waits for a packet, until an instant; looks once when that has passed. May be dropped: a packet stays in the chip until it is read,
-    /// and is lost only when the call is dropped while it is on the bus.
+    /// Waits for a packet until an instant; checks once when that has passed. May be dropped: a
+    /// packet stays in the chip until it is read. It is lost only when the call is dropped during
+    /// the read.
     ///
     /// # Errors
     /// Those of [`receive`](Self::receive).
@@ -275,8 +292,9 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         Ok(None)
     }
 
-    /// One step of a receiver that hops: listens where it says, until there is a packet, until it wants to go on, or until an instant, whichever is
-    /// first. Call it in a loop, and look after everything else in between.
+    /// One step of a hopping receiver: listens to its channel until a packet arrives, until its
+    /// next poll is due, or until an instant, whichever is first. Call it in a loop, with the rest
+    /// of the task's work in between.
     ///
     /// ```
     /// # use core::convert::Infallible;
@@ -284,7 +302,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
     /// use stampfly_nrf24l01::embedded_hal_async::spi::SpiDevice;
     /// use stampfly_nrf24l01::{ChipError, Duration, Hopper, Nrf24l01, Timebase};
     ///
-    /// /// A task that follows a transmitter for ever, and looks up every 10 ms.
+    /// /// A task that follows a transmitter, with a chance for other work every 10 ms.
     /// async fn receive<S: SpiDevice, E: OutputPin, T: Timebase + Clone>(
     ///     mut radio: Nrf24l01<S, E, T>,
     ///     mut receiver: impl Hopper<10>,
@@ -308,10 +326,11 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         Ok(())
     }
 
-    /// Sends a packet, and goes to standby.
+    /// Sends a packet and returns to standby.
     ///
     /// # Errors
-    /// [`ChipError::NoSample`] when the chip does not say that it has sent it, and those of [`listen`](Self::listen).
+    /// [`ChipError::NoSample`] when the chip does not report that it has sent the packet, and those
+    /// of [`listen`](Self::listen).
     pub async fn send(&mut self, tuning: Tuning, payload: &[u8; N]) -> Result<(), ChipError<S::Error>> {
         if tuning.channel > codec::LAST_CHANNEL {
             return Err(ChipError::InvalidConfiguration);
@@ -321,7 +340,8 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         }
         self.stand_by()?;
         self.check().await?;
-        // Until the direction is that of a receiver again: a call that is dropped here is followed by a start.
+        // Until the chip is a receiver again. If the call is dropped before that, the next one
+        // starts with a set-up.
         self.running = false;
         let configuration = codec::configuration(self.config.checksum);
         self.port.write(register::CONFIG, &[configuration & !codec::RECEIVES]).await?;
@@ -333,6 +353,7 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         self.enable(true)?;
         self.port.wait(PULSE).await;
         self.enable(false)?;
+        // No polling during the transmission, whose duration is known.
         let takes = SETTLE + Duration::from_micros(codec::airtime(&self.config, N));
         let deadline = self.port.now() + takes + SEND_MARGIN;
         self.port.wait(takes).await;
@@ -353,30 +374,32 @@ impl<S: SpiDevice, E: OutputPin, T: Timebase, P: Wait, const N: usize> Nrf24l01<
         if sent { Ok(()) } else { Err(ChipError::NoSample) }
     }
 
-    /// Was there a carrier on the channel, of −64 dBm or more, while it listened (6.4)? Nothing for 170 µs after [`listen`](Self::listen).
+    /// Whether the chip has detected a carrier of at least −64 dBm on the channel (6.4). Valid from
+    /// 170 µs after [`listen`](Self::listen) on.
     ///
     /// # Errors
-    /// The bus.
+    /// Errors of the bus.
     pub async fn carrier(&mut self) -> Result<bool, ChipError<S::Error>> {
         let [detected]: [u8; 1] = self.port.read(register::RPD).await?;
         Ok(detected & 1 != 0)
     }
 
-    /// Switches the radio off; what it was told stays. The next call starts it again. A start that was never made is no matter.
+    /// Powers the radio down. The settings are kept, and the next call sets the chip up. May be
+    /// called before the first start.
     ///
     /// # Errors
-    /// The bus, and [`ChipError::Pin`].
+    /// Errors of the bus, and [`ChipError::Pin`].
     pub async fn power_down(&mut self) -> Result<(), ChipError<S::Error>> {
         self.stand_by()?;
         self.running = false;
         self.port.write(register::CONFIG, &[codec::configuration(self.config.checksum) & !codec::POWERED]).await
     }
 
-    /// Does the chip still have its configuration?
+    /// Checks that the chip still has its configuration.
     async fn check(&mut self) -> Result<(), ChipError<S::Error>> {
         let wanted = codec::configuration(self.config.checksum);
         for _ in 0..2 {
-            // Twice, before a wrong bit on the bus costs a start.
+            // Two reads, so that one wrong bit on the bus does not cause a new set-up.
             let [kept]: [u8; 1] = self.port.read(register::CONFIG).await?;
             if kept == wanted {
                 return Ok(());

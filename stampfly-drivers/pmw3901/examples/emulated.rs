@@ -1,4 +1,5 @@
-//! A PMW3901 emulated down to its registers, on this PC: a vehicle that stands still sees no flow.
+//! Runs the driver on a register-level emulation of a PMW3901 on this PC: a vehicle at rest
+//! measures no flow.
 //!
 //! `cargo run -p stampfly-pmw3901 --example emulated-pmw3901`, in the repository.
 

@@ -1,7 +1,9 @@
-//! A PMW3901 on a computer with Linux, such as a Raspberry Pi: on SPI at `/dev/spidev0.0`. Shows
-//! how far the picture moved.
+//! A PMW3901 on a computer with Linux, such as a Raspberry Pi. Prints the motion of the image.
 //!
-//! `stampfly-drivers/boards/linux` has the versions of the crates: `cargo run --example pmw3901` there.
+//! Wiring: SPI at `/dev/spidev0.0`.
+//!
+//! Build it in `stampfly-drivers/boards/linux`, which contains the versions of the crates:
+//! `cargo run --example pmw3901`.
 
 use linux_embedded_hal::spidev::{SpiModeFlags, SpidevOptions};
 use linux_embedded_hal::{Delay, SpidevDevice};

@@ -1,7 +1,9 @@
-//! A PMW3901 on a Raspberry Pi Pico 2: SCK at GP18, SDI at GP19, SDO at GP16, chip select at GP17. Shows how far the picture moved
-//! through the debug probe.
+//! A PMW3901 on a Raspberry Pi Pico 2. Prints the motion of the image through the debug probe.
 //!
-//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example pmw3901` there.
+//! Wiring: SCK GP18, SDI GP19, SDO GP16, chip select GP17.
+//!
+//! Build it in `stampfly-drivers/boards/rp2350`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example pmw3901`.
 
 #![no_std]
 #![no_main]

@@ -1,29 +1,31 @@
-//! Registers, tables and the motion burst of the PMW3901, from PixArt's PMW3901MB-TXQT product
-//! data sheet.
+//! Registers, tables and the motion burst of the PMW3901, from PixArt's PMW3901MB-TXQT product data
+//! sheet.
 
-/// Register addresses ("Registers", table of the data sheet's last chapter).
+/// Register addresses ("Registers", table in the last chapter of the data sheet).
 pub mod register {
     /// Identification: [`PRODUCT`](super::PRODUCT).
     pub const PRODUCT_ID: u8 = 0x00;
-    /// Motion; reading it and the four after it empties what has been counted.
+    /// Motion; reading it and the following four registers resets the counts.
     pub const MOTION: u8 = 0x02;
-    /// All of a sample in one transfer.
+    /// A complete sample in one transfer.
     pub const MOTION_BURST: u8 = 0x16;
     /// Reset.
     pub const POWER_UP_RESET: u8 = 0x3A;
-    /// Identification, every bit the other way round.
+    /// Bitwise inverse of the identification.
     pub const INVERSE_PRODUCT_ID: u8 = 0x5F;
-    /// Chooses the bank that the performance registers are in.
+    /// Selects the bank of the performance registers.
     pub const BANK: u8 = 0x7F;
 }
 
-/// What [`register::PRODUCT_ID`] reads.
+/// Value of [`register::PRODUCT_ID`].
 pub const PRODUCT: u8 = 0x49;
-/// Written to [`register::POWER_UP_RESET`].
+/// Value that [`register::POWER_UP_RESET`] takes for a reset.
 pub const RESET: u8 = 0x5A;
-/// Angle of one count, rad. Not in the data sheet: recorded flights, regressed on the gyroscope.
+/// Angle of one count, rad. Not from the data sheet: from a regression of recorded flights on the
+/// gyroscope.
 pub const RADIANS_PER_COUNT: f32 = 0.002_22;
-/// Below this quality the data sheet ("Burst mode") distrusts a sample whose shutter is fully open.
+/// Quality below which the data sheet ("Burst mode") considers a sample with a fully open shutter
+/// invalid.
 pub const MINIMUM_QUALITY: u8 = 0x19;
 const SHUTTER_OPEN: u8 = 0x1F;
 
@@ -32,17 +34,18 @@ const SHUTTER_OPEN: u8 = 0x1F;
 pub enum Step {
     /// Write a value to a register.
     Write(u8, u8),
-    /// Wait milliseconds.
+    /// Wait for a number of milliseconds.
     Wait(u8),
 }
 
-/// Prepares the look at the chip's own calibration ("Performance optimization registers", first part).
+/// Prepares reading the chip's own calibration ("Performance optimization registers", first part).
 pub const PREPARE: [(u8, u8); 5] = [(0x7F, 0x00), (0x55, 0x01), (0x50, 0x07), (0x7F, 0x0E), (0x43, 0x10)];
 
-/// Prepares the second look at it.
+/// Prepares reading the second part of the calibration.
 pub const PREPARE_CALIBRATION: [(u8, u8); 5] = [(0x7F, 0x00), (0x51, 0x7B), (0x50, 0x00), (0x55, 0x00), (0x7F, 0x0E)];
 
-/// Two values of the chip's calibration, from bank 0x0E, registers 0x70 and 0x71, as they have to be written back.
+/// Two values to be written back, from the chip's calibration in registers 0x70 and 0x71 of bank
+/// 0x0E.
 #[must_use]
 pub const fn calibration(first: u8, second: u8) -> [u8; 2] {
     let raised = if first <= 28 { first + 14 } else { first.saturating_add(11) };
@@ -50,16 +53,19 @@ pub const fn calibration(first: u8, second: u8) -> [u8; 2] {
     [raised, (second as u16 * 45 / 100) as u8]
 }
 
-/// Says that the calibration comes next, in bank 0.
+/// Prepares writing the calibration, from bank 0.
 pub const BEFORE_CALIBRATION: [(u8, u8); 4] = [(0x7F, 0x00), (0x61, 0xAD), (0x51, 0x70), (0x7F, 0x0E)];
 
 /// The rest of the list ("Performance optimization registers").
 ///
-/// The data sheet prints it in columns, and its public copies read those in two ways. This is the way of PX4, of
-/// Crazyflie's firmware, of Bitcraze's library for Arduino and of ten further copies; the StampFly's own firmware has
-/// 0x63 in bank 7 and 0x32 in bank 9 after a pause of its own, and writes the calibration's first value to 0x51 instead
-/// of 0x70. Of 0x65 and 0x63 in bank 0x14 and 0x48 in bank 0x15 there are two sets of values; Bitcraze's library has
-/// 0x60, 0x78 and 0x58. The pause is 10 ms or 100 ms. **Unverified** which of it matters to the chip.
+/// The data sheet prints it in columns, which public copies read in two orders. This order is that
+/// of PX4, Crazyflie's firmware, Bitcraze's library for Arduino and ten further copies. The
+/// StampFly's own firmware writes 0x63 in bank 7 and 0x32 in bank 9 after an additional pause, and
+/// the first value of the calibration to 0x51 instead of 0x70.
+///
+/// For 0x65 and 0x63 in bank 0x14 and 0x48 in bank 0x15 there are two sets of values; Bitcraze's
+/// library has 0x60, 0x78 and 0x58. The pause is 10 ms or 100 ms. **Unverified** whether these
+/// differences matter to the chip.
 #[rustfmt::skip]
 pub const PERFORMANCE: &[Step] = {
     use Step::{Wait as P, Write as W};
@@ -88,15 +94,15 @@ pub const PERFORMANCE: &[Step] = {
     ]
 };
 
-/// A register of the list, in the bank where the list ends, and what it is told. A chip that restarted has another
-/// value there.
+/// A register of the list, in the bank in which the list ends, and its value. After a restart the
+/// chip has another value there.
 pub const WITNESS: (u8, u8) = (0x4E, 0xA8);
 
-/// How many registers the list leaves behind.
+/// Number of registers that the list sets.
 pub const SETTINGS: usize = 55;
 
-/// What [`PERFORMANCE`] leaves behind: bank, register and value, in the order of the list. Where it writes a register
-/// twice, the last value.
+/// Final settings of [`PERFORMANCE`]: bank, register and value, in the order of the list. For a
+/// register that the list writes twice, the last value.
 pub fn settings() -> impl Iterator<Item = (u8, u8, u8)> {
     let mut written = writes();
     core::iter::from_fn(move || {
@@ -109,7 +115,7 @@ pub fn settings() -> impl Iterator<Item = (u8, u8, u8)> {
     })
 }
 
-/// The list's writes, each with its bank.
+/// The writes of the list, each with its bank.
 fn writes() -> impl Iterator<Item = (u8, u8, u8)> + Clone {
     let mut bank = 0;
     PERFORMANCE.iter().filter_map(move |step| match *step {
@@ -122,27 +128,27 @@ fn writes() -> impl Iterator<Item = (u8, u8, u8)> + Clone {
     })
 }
 
-/// One motion burst ("Burst mode").
+/// The motion burst ("Burst mode").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
-    /// Has anything moved since the last read?
+    /// Whether motion was detected since the last read.
     pub moved: bool,
-    /// Counts along the chip's x since the last read.
+    /// Counts along the chip's x axis since the last read.
     pub delta_x: i16,
-    /// Counts along the chip's y since the last read.
+    /// Counts along the chip's y axis since the last read.
     pub delta_y: i16,
-    /// SQUAL: a quarter of the number of features in the picture.
+    /// SQUAL: a quarter of the number of features in the image.
     pub quality: u8,
-    /// Brightest and darkest pixel of the picture, 7 bits.
+    /// Value of the brightest pixel of the image, 7 bits.
     pub brightest: u8,
-    /// See [`brightest`](Self::brightest).
+    /// Value of the darkest pixel of the image, 7 bits.
     pub darkest: u8,
-    /// Exposure of the picture; its upper five bits are all ones in the dark.
+    /// Exposure of the image, 13 bits. In the dark its upper five bits are all ones.
     pub shutter: u16,
 }
 
 impl Motion {
-    /// Takes the burst apart; `None` when no chip drives the bus: every byte the same, all ones or all zeros.
+    /// Decodes the burst. `None` when no chip drives the bus: all bytes ones or all zeros.
     #[must_use]
     pub fn decode(bytes: &[u8; 12]) -> Option<Self> {
         if *bytes == [0xFF; 12] || *bytes == [0; 12] {
@@ -160,21 +166,21 @@ impl Motion {
         })
     }
 
-    /// Can this be a picture that the chip has taken?
+    /// Whether the chip can have taken this image.
     ///
-    /// No without an exposure, when the darkest pixel is brighter than the brightest, and when all is black though the
-    /// shutter is not fully open, which it is in the dark. How bright a picture is in the dark is **unverified**, so any is
-    /// accepted.
+    /// False without an exposure, when the darkest pixel is brighter than the brightest, and when
+    /// all pixels are black although the shutter is not fully open, as it is in the dark. The
+    /// brightness of an image in the dark is **unverified**, so any value is accepted there.
     #[must_use]
     pub const fn is_exposed(&self) -> bool {
         let dark = self.shutter >> 8 == SHUTTER_OPEN as u16;
         self.shutter > 0 && self.darkest <= self.brightest && (self.brightest > 0 || dark)
     }
 
-    /// Does the picture carry the counts?
+    /// Whether the image quality supports the counts.
     ///
-    /// No when the data sheet's rule says so: low quality in the dark. Also not when nothing moved in a picture of low
-    /// quality: "sees nothing" must not be taken for "stands still".
+    /// False by the data sheet's rule: low quality in the dark. Also false without motion at low
+    /// quality, because a sensor without features must not be mistaken for one that does not move.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let poor = self.quality < MINIMUM_QUALITY;

@@ -17,43 +17,45 @@ use stampfly_types::Vec3;
 pub use stampfly_types::messages::FlowData;
 pub use stampfly_types::{Duration, Instant};
 
-/// Bytes of the longest transfer, a burst.
+/// Bytes of the longest transfer, the motion burst.
 const BURST: usize = 12;
-/// From power-on to the first access ("Power-up sequence").
+/// Time from power-on to the first access ("Power-up sequence").
 const POWER_UP: Duration = Duration::from_millis(45);
 const AFTER_RESET: Duration = Duration::from_millis(5);
-/// From an address to the data it asks for (tSRAD), ns.
+/// Time from an address to its data (tSRAD), ns.
 const ADDRESS_TO_DATA: u32 = 35_000;
-/// From the end of a write to the next access (tSWW, tSWR).
+/// Time from the end of a write to the next access (tSWW, tSWR).
 const AFTER_WRITE: Duration = Duration::from_micros(45);
-/// From the end of a read to the next access (tSRW, tSRR).
+/// Time from the end of a read to the next access (tSRW, tSRR).
 const AFTER_READ: Duration = Duration::from_micros(20);
-/// From the last clock of a write to the end of the chip select (tSCLK-NCS, table 5 of data sheet R1.10), ns. That of a read is 120 ns.
+/// Time from the last clock of a write to the release of the chip select (tSCLK-NCS, table 5 of
+/// data sheet R1.10), ns. For a read it is 120 ns.
 const WRITE_HOLD: u32 = 35_000;
-/// How often a chip that runs is asked whether it still holds what it was told.
+/// Period of the check that a running chip still holds its settings.
 const WITNESS_INTERVAL: Duration = Duration::from_secs(1);
-/// How often the chip's calibration is asked for before it counts as broken.
+/// Number of attempts to read the chip's calibration.
 const ATTEMPTS: usize = 10;
-/// Settings that depend on the chip.
+/// Number of settings that depend on the individual chip.
 const CALIBRATED: usize = 5;
-/// How many pictures the self test looks at, and from one to the next; the chip makes one in 8 ms.
+/// Self test: number of images, and the pause before each. The chip takes one image per 8 ms.
 const PICTURES: usize = 5;
 const PICTURE: Duration = Duration::from_millis(20);
-/// So long a chip may see nothing at all before it is set up again.
+/// Time with a quality of zero after which the chip is set up again.
 const BLIND: Duration = Duration::from_secs(10);
 
-/// What the driver is told.
+/// Configuration of the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// Time between two samples. Pictures come at 121 Hz: faster than that gives empty samples.
+    /// Time between two samples. The chip takes images at 121 Hz; a shorter interval yields samples
+    /// without motion.
     pub interval: Duration,
-    /// Angle of one count, rad; a lens of another distance has another.
+    /// Angle of one count, rad. Depends on the focal length of the lens.
     pub radians_per_count: f32,
 }
 
 impl Default for Config {
-    /// 100 Hz, the module's own lens.
+    /// 100 Hz, with the lens of the module.
     fn default() -> Self {
         Self { interval: Duration::from_millis(10), radians_per_count: codec::RADIANS_PER_COUNT }
     }
@@ -61,19 +63,24 @@ impl Default for Config {
 
 /// The driver, on SPI in mode 3 at no more than 2 MHz. Implements [`OpticalFlow`].
 ///
-/// `Sample::at` is the instant of the read; the newest picture in it is up to 8 ms older, which the chip does not tell.
-/// `FlowData::interval` is the time since the counts were last emptied, whatever the caller's rhythm. After a read that
-/// failed or was cancelled nobody knows what was lost: the driver empties the counts and begins a new interval, so no
-/// sample ever covers less time than it says.
+/// `Sample::at` is the instant of the read. The newest image in it is up to 8 ms older; the chip
+/// does not report its age. `FlowData::interval` is the time since the counts were last reset,
+/// independent of the caller's timing. After a read that failed or was dropped, the lost counts are
+/// unknown: the driver resets the counts and starts a new interval, so that the counts of a sample
+/// always match its interval.
 ///
-/// A chip without its settings goes on counting, badly and without saying so. A start therefore reads back all of them,
-/// and once a second `next` reads back one: another value is [`ChipError::Restarted`], and the next call sets the chip up
-/// again. A start that failed, wherever it was, is begun again from the reset. The registers are undocumented. One that reads the same other value at two starts in a row cannot be read back
-/// and is not asked. What else may have gone wrong costs ten seconds: after as long with a quality of zero, which is also
-/// what it sees in the dark, `next` says [`ChipError::NoSample`], and the one after sets the chip up again.
+/// A chip without its settings continues to count, with poor quality and no indication of the
+/// fault. `start` therefore reads all settings back, and `next` reads one back every second. On a
+/// mismatch it returns [`ChipError::Restarted`], and the next call sets the chip up again. A start
+/// that failed at any point is repeated from the reset.
 ///
-/// A sample costs 110 µs of bus, most of it the pause between address and data. `next` ends within the interval and
-/// 40 ms; when it has to start the chip and every access is slow, within 4 s.
+/// The registers of the settings are undocumented. A register that reads the same other value in
+/// two consecutive starts counts as write-only and is not checked. To recover from faults that this
+/// leaves undetected, `next` returns [`ChipError::NoSample`] after ten seconds with a quality of
+/// zero, which also occurs in the dark, and the following call sets the chip up again.
+///
+/// A sample takes 110 µs on the bus, most of it the pause between address and data. `next` returns
+/// within the interval and 40 ms; with a start and slow accesses, within 4 s.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock};
@@ -94,13 +101,13 @@ pub struct Pmw3901<S, T> {
     axes: AxisMap,
     config: Config,
     running: bool,
-    /// When the counts were last emptied; `None` when that is unknown.
+    /// Time of the last reset of the counts; `None` when unknown.
     emptied: Option<Instant>,
-    /// When to ask next whether the chip restarted; `None` when it cannot be asked.
+    /// Time of the next check for a restart; `None` when the register cannot be read back.
     witness: Option<Instant>,
-    /// What the settings read back as after the last start.
+    /// Settings as read back after the last start.
     kept: Option<[u8; CALIBRATED + codec::SETTINGS]>,
-    /// When it last saw anything.
+    /// Time of the last sample with a quality above zero.
     saw: Instant,
 }
 
@@ -128,16 +135,17 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         self
     }
 
-    /// Takes the driver apart: the device and the clock. The chip goes on counting.
+    /// Takes the driver apart and returns the device and the clock. The chip continues to count.
     pub fn release(self) -> (S, T) {
         (self.device, self.clock)
     }
 
-    /// Sets the chip up: reset, both identifications, calibration, performance registers, which it reads back. About
-    /// 75 ms, twice that when something reads back otherwise.
+    /// Sets the chip up: reset, both identifications, calibration, performance registers with
+    /// read-back. About 75 ms, twice that after a mismatch.
     ///
     /// # Errors
-    /// Another chip, one that does not give its calibration or keep its settings, the bus.
+    /// [`ChipError::Identification`], [`ChipError::Configuration`] when the chip does not provide
+    /// its calibration or does not keep its settings, and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<S::Error>> {
         self.running = false;
         self.emptied = None;
@@ -156,17 +164,18 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Ok(())
     }
 
-    /// Sets the chip up, reads all its settings back and looks at up to five pictures. 0.1 s, 0.2 s when the start needs
-    /// its second try, within 4.2 s however slow the bus.
+    /// Sets the chip up, reads all settings back and checks up to five images. 0.1 s, 0.2 s when
+    /// the start needs a second attempt, at most 4.2 s on a slow bus.
     ///
-    /// The chip has no self test of its own: this one asks whether the picture and its exposure go together. It passes over
-    /// any floor and in the dark, and cannot tell a covered lens from the dark. Afterwards the chip is set up.
+    /// The chip has no self test of its own: this one checks that image and exposure are
+    /// consistent. It passes over any floor and in the dark, and cannot distinguish a covered lens
+    /// from the dark. The chip is set up afterwards.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start): [`ChipError::Identification`] for either of the two identifications,
-    /// [`ChipError::Configuration`] for a calibration that is not there or a setting that was not kept;
-    /// [`ChipError::Data`] when nobody answers any more; [`ChipError::SelfTest`] when no picture is one that the chip can
-    /// have taken ([`Motion::is_exposed`]).
+    /// Those of [`start`](Self::start): [`ChipError::Identification`] for either identification,
+    /// [`ChipError::Configuration`] for a missing calibration or a setting that was not kept;
+    /// [`ChipError::Data`] when the chip no longer answers; [`ChipError::SelfTest`] when the chip
+    /// cannot have taken any of the images ([`Motion::is_exposed`]).
     pub async fn self_test(&mut self) -> Result<(), ChipError<S::Error>> {
         self.start().await?;
         for _ in 0..PICTURES {
@@ -180,11 +189,12 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Err(ChipError::SelfTest)
     }
 
-    /// From any state to the end of the list. Gives the settings that depend on the chip: bank, register, value.
+    /// Configures the chip from any state, up to the end of the list. Returns the settings that
+    /// depend on the chip: bank, register, value.
     async fn configure(&mut self) -> Result<[Option<(u8, u8, u8)>; CALIBRATED], ChipError<S::Error>> {
         let ready = self.clock.now() + POWER_UP;
         sleep_until(&mut self.clock, ready).await;
-        // Reset is in the first bank, and a start that failed may have left another.
+        // The reset register is in bank 0, and a failed start may have left another bank selected.
         self.write(register::BANK, 0).await?;
         self.write(register::POWER_UP_RESET, codec::RESET).await?;
         self.wait(AFTER_RESET).await;
@@ -192,6 +202,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if found != codec::PRODUCT || inverse != !codec::PRODUCT {
             return Err(ChipError::Identification { found: u16::from_be_bytes([found, inverse]) });
         }
+        // Part of the data sheet's start sequence: reading the motion registers clears them.
         for offset in 0..5 {
             self.read(register::MOTION + offset).await?;
         }
@@ -205,8 +216,9 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Ok(calibrated)
     }
 
-    /// Reads every setting back. Gives the first that is neither what was written nor what it was after the start
-    /// before, which is all that a register that cannot be read back will ever say.
+    /// Reads every setting back. Returns the first value that differs both from the written value
+    /// and from the one after the previous start; a register that is write-only reads the same in
+    /// both.
     async fn proof_read(
         &mut self,
         calibrated: [Option<(u8, u8, u8)>; CALIBRATED],
@@ -214,7 +226,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         let before = self.kept.take();
         let mut kept = [0; CALIBRATED + codec::SETTINGS];
         let mut wrong = None;
-        // The list ends in the first bank. It comes last, so that its last registers tell that this is selected.
+        // The list ends in bank 0. Checking that bank last also shows that it is selected.
         let mut bank = 0;
         let settings = calibrated.into_iter().chain(codec::settings().map(Some));
         for (number, (setting, kept)) in settings.zip(&mut kept).enumerate() {
@@ -224,7 +236,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
             }
             *kept = self.read(register).await?;
             if *kept != value {
-                // It may have been garbled on its way back.
+                // A second read, in case the first was corrupted on the bus.
                 *kept = self.read(register).await?;
             }
             let as_before = before.and_then(|before| before.get(number).copied()) == Some(*kept);
@@ -236,15 +248,15 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Ok(wrong)
     }
 
-    /// Has the chip lost what it was told?
+    /// Checks that the chip still holds its settings.
     async fn check(&mut self) -> Result<(), ChipError<S::Error>> {
         if self.witness.is_none_or(|due| self.clock.now() < due) {
             return Ok(());
         }
-        // From the end of the last burst.
+        // The minimum pause after the previous burst.
         self.wait(AFTER_READ).await;
         let (register, value) = codec::WITNESS;
-        // Twice, before a wrong bit on the bus costs a start.
+        // Two reads, so that one wrong bit on the bus does not cause a new set-up.
         if self.read(register).await? == value || self.read(register).await? == value {
             self.witness = Some(self.clock.now() + WITNESS_INTERVAL);
             return Ok(());
@@ -258,6 +270,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         for (register, value) in codec::PREPARE {
             self.write(register, value).await?;
         }
+        // The chip prepares its calibration; 0x08 reports that it is ready.
         let mut status = self.read(0x47).await?;
         for _ in 1..ATTEMPTS {
             if status == 0x08 {
@@ -269,11 +282,13 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if status != 0x08 {
             return Err(ChipError::Configuration { status });
         }
+        // Undocumented values, as in the data sheet's list.
         let range = if self.read_twice(0x67).await? & 0x80 != 0 { 0x04 } else { 0x02 };
         self.write(0x48, range).await?;
         for (register, value) in codec::PREPARE_CALIBRATION {
             self.write(register, value).await?;
         }
+        // The data sheet's list writes a calibration back only when this register reads zero.
         if self.read_twice(0x73).await? != 0 {
             return Ok([Some((0x00, 0x50, 0x00)), Some((0x00, 0x51, 0x7B)), Some((0x0E, 0x48, range)), None, None]);
         }
@@ -297,7 +312,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         if let Some(motion) = Motion::decode(&bytes) {
             return Ok(motion);
         }
-        // Nobody there. Whoever comes back has lost its registers.
+        // No chip answers. When it answers again, it will have lost its registers.
         self.running = false;
         Err(ChipError::Data)
     }
@@ -312,7 +327,7 @@ impl<S: SpiDevice, T: Timebase> Pmw3901<S, T> {
         Ok(value)
     }
 
-    /// Reads what will be believed until the next start.
+    /// Reads a value that stays in use until the next start, twice, and compares.
     async fn read_twice(&mut self, register: u8) -> Result<u8, ChipError<S::Error>> {
         let first = self.read(register).await?;
         if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
@@ -349,10 +364,11 @@ impl<S: SpiDevice, T: Timebase> OpticalFlow for Pmw3901<S, T> {
             }
         };
         sleep_until(&mut self.clock, emptied + self.config.interval).await;
-        // Until the burst is over, nobody knows what it takes away.
+        // Until the burst has ended, the counts it resets are unknown.
         self.emptied = None;
         let motion = self.burst().await?;
         let at = self.clock.now();
+        // An interval of zero would make every angle an infinite rate.
         if at <= emptied {
             return Err(ChipError::ClockStopped);
         }

@@ -1,4 +1,4 @@
-//! A passive buzzer: a pitch is the frequency of a PWM channel.
+//! A passive buzzer on a PWM channel, whose frequency is the pitch.
 
 use super::Indicator;
 use super::tune::{Note, notes};
@@ -6,21 +6,22 @@ use embedded_hal::pwm::SetDutyCycle;
 use stampfly_types::Instant;
 use stampfly_types::messages::Signal;
 
-/// A PWM channel that has its frequency to itself.
+/// A PWM channel whose frequency can be changed.
 ///
-/// `embedded-hal` sets duty cycles only. Implemented by boards on a timer that no other channel uses.
+/// `embedded-hal` sets only duty cycles. Boards implement this trait on a timer that no other
+/// channel uses.
 pub trait SetFrequency: SetDutyCycle {
-    /// Sets the frequency; the duty cycle stays.
+    /// Sets the frequency, Hz. The duty cycle, as a share of the period, stays the same.
     ///
     /// # Errors
-    /// When the timer cannot do it.
+    /// When the timer cannot generate this frequency.
     fn set_frequency(&mut self, hertz: u32) -> Result<(), Self::Error>;
 }
 
 /// Plays the tunes of [`Signal`]s.
 ///
-/// [`show`](Indicator::show) only notes what is to be played; [`step`](Self::step) plays it and has to be called every
-/// few milliseconds. A tune that comes while another plays takes its place. Silent when dropped.
+/// [`show`](Indicator::show) selects the tune, and [`step`](Self::step) plays it; call `step` every
+/// few milliseconds. A new tune replaces the one that is playing. Dropping the buzzer silences it.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -51,10 +52,10 @@ pub trait SetFrequency: SetDutyCycle {
 pub struct Buzzer<C: SetFrequency> {
     channel: C,
     tune: &'static [Note],
-    /// When it began; `None` until the first step after it was shown.
+    /// Start of the tune; `None` between `show` and the next `step`.
     began: Option<Instant>,
     count: u32,
-    /// Pitch the channel plays; `None` when nobody knows.
+    /// Frequency the channel plays, 0 for silence; `None` when it is unknown after an error.
     sounding: Option<u16>,
 }
 
@@ -65,12 +66,13 @@ impl<C: SetFrequency> Buzzer<C> {
         Self { channel, tune: &[], began: None, count: 0, sounding: silent.then_some(0) }
     }
 
-    /// Plays on.
+    /// Plays the note that is due at `now`.
     ///
     /// # Errors
-    /// When the channel refuses; the next step tries again.
+    /// When the channel refuses. The next step tries again.
     pub fn step(&mut self, now: Instant) -> Result<(), C::Error> {
         let began = *self.began.get_or_insert(now);
+        // Time into the tune; the search subtracts the length of each note before the present one.
         let mut left = now.since(began).as_micros() / 1_000;
         let note = self.tune.iter().find(|(_, millis)| {
             let ends = left < u64::from(*millis);
@@ -80,7 +82,7 @@ impl<C: SetFrequency> Buzzer<C> {
         self.sound(note.map_or(0, |(hertz, _)| *hertz))
     }
 
-    /// The channel.
+    /// The PWM channel.
     pub const fn channel(&self) -> &C {
         &self.channel
     }
@@ -89,6 +91,7 @@ impl<C: SetFrequency> Buzzer<C> {
         if self.sounding == Some(hertz) {
             return Ok(());
         }
+        // Unknown until both settings have succeeded, so that a failed step is repeated.
         self.sounding = None;
         if hertz == 0 {
             self.channel.set_duty_cycle_fully_off()?;
@@ -113,7 +116,7 @@ impl<C: SetFrequency> Indicator for Buzzer<C> {
 
 impl<C: SetFrequency> Drop for Buzzer<C> {
     fn drop(&mut self) {
-        // Nobody is left to tell.
+        // The error has no receiver in `drop`.
         let _ = self.channel.set_duty_cycle_fully_off();
     }
 }
@@ -171,7 +174,7 @@ mod tests {
         Signal { tone, tone_count, ..Default::default() }
     }
 
-    /// What is heard every 50 ms.
+    /// Frequencies played, one every 50 ms; 0 for silence.
     fn heard(buzzer: &mut Buzzer<Channel<'_>>, state: &Cell<State>, from: u64, steps: u64) -> Vec<u32> {
         let step = |n| {
             buzzer.step(Instant::from_millis(from + 50 * n)).expect("works");

@@ -1,21 +1,23 @@
-//! Lights with a chip in each, in a chain on one pin: WS2812 and its relatives.
+//! Addressable lights in a chain on one pin: WS2812 and compatible parts.
 
 use super::Indicator;
 use smart_leds_trait::{RGB8, SmartLedsWrite, SmartLedsWriteAsync};
 use stampfly_types::messages::Signal;
 use stampfly_types::{Duration, Instant};
 
-/// How often lights are written that show what they should, for all that is known.
+/// Period of repeated writes while the colour does not change.
 const REFRESH: Duration = Duration::from_secs(1);
 
 /// A chain of `N` lights that all show the same colour.
 ///
-/// [`show`](Indicator::show) writes when the colour changes, and again after a write that failed; for as long as the
-/// writer takes, which is 30 µs per light. [`step`](Self::step) writes again once a second: a light that lost its supply
-/// for a moment is dark and cannot say so. The order of the colours on the wire is the writer's.
+/// [`show`](Indicator::show) writes when the colour changes or the previous write failed, and
+/// blocks for as long as the writer does: 30 µs per light. [`step`](Self::step) repeats the write
+/// once a second, because a light that lost its supply for a moment stays dark until it is written
+/// again. The writer defines the order of the colours on the wire.
 ///
-/// A writer that waits for its unit without a limit holds everything else on its core if the unit never ends. An async
-/// writer does not: [`update`](Self::update) is both in one, and can be given up at any time.
+/// A blocking writer that waits for its peripheral without a time limit blocks everything on its
+/// core when the peripheral hangs. With an async writer use [`update`](Self::update), which
+/// combines `show` and `step` and may be dropped at any time.
 ///
 /// ```
 /// # use core::convert::Infallible;
@@ -32,42 +34,42 @@ const REFRESH: Duration = Duration::from_secs(1);
 /// use stampfly_drivers::{Indicator, Lights};
 /// use stampfly_types::{Instant, messages::Signal};
 ///
-/// // One light for the state, two below and above the body for the flight mode, as on the StampFly.
+/// // One status light, and two lights below and above the body for the flight mode, as on the StampFly.
 /// let (mut status, mut body) = (Lights::<_, 1>::status(Chain::default()), Lights::<_, 2>::body(Chain::default()));
 /// let signal = Signal { status: [0, 32, 0], body: [32, 0, 32], ..Default::default() };
 /// status.show(&signal);
 /// body.show(&signal);
 /// assert_eq!(status.writer().0, [RGB8::new(0, 32, 0)]);
 /// assert_eq!(body.writer().0, [RGB8::new(32, 0, 32); 2]);
-/// // Now and then, with the time.
+/// // Call it regularly with the time.
 /// status.step(Instant::from_secs(5));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Lights<W, const N: usize> {
     writer: W,
     colour: fn(&Signal) -> [u8; 3],
-    /// What they were told to show; `None` before they were.
+    /// Colour to show; `None` before the first signal.
     wanted: Option<[u8; 3]>,
-    /// `None` when nobody knows.
+    /// Colour that was written last; `None` when that write failed or was dropped.
     shown: Option<[u8; 3]>,
-    /// When to write again.
+    /// Time of the next repeated write.
     due: Option<Instant>,
 }
 
 impl<W, const N: usize> Lights<W, N> {
-    /// Lights that show the state.
+    /// Lights that show [`Signal::status`].
     #[must_use]
     pub const fn status(writer: W) -> Self {
         Self { writer, colour: |signal| signal.status, wanted: None, shown: None, due: None }
     }
 
-    /// Lights that show the flight mode.
+    /// Lights that show [`Signal::body`].
     #[must_use]
     pub const fn body(writer: W) -> Self {
         Self { writer, colour: |signal| signal.body, wanted: None, shown: None, due: None }
     }
 
-    /// What writes them.
+    /// The writer of the lights.
     pub const fn writer(&self) -> &W {
         &self.writer
     }
@@ -77,8 +79,8 @@ impl<W: SmartLedsWrite, const N: usize> Lights<W, N>
 where
     RGB8: Into<W::Color>,
 {
-    /// Writes what is shown again when a second has passed since this was called for the last time and did so. To be
-    /// called as often as anybody likes.
+    /// Repeats the last colour when a second has passed since the previous repetition. May be
+    /// called at any rate.
     pub fn step(&mut self, now: Instant) {
         if self.due.is_none_or(|due| now >= due) {
             self.due = Some(now + REFRESH);
@@ -89,6 +91,7 @@ where
     fn write(&mut self) {
         if let Some([red, green, blue]) = self.wanted {
             let written = self.writer.write([RGB8 { r: red, g: green, b: blue }; N]);
+            // After a failed write the colour is unknown, so the next signal writes again.
             self.shown = self.wanted.filter(|_| written.is_ok());
         }
     }
@@ -98,8 +101,9 @@ impl<W: SmartLedsWriteAsync, const N: usize> Lights<W, N>
 where
     RGB8: Into<W::Color>,
 {
-    /// Writes when the colour has changed, when the last write failed or was given up, and once a second. To be called
-    /// as often as anybody likes, and to be given up after a time: a writer may wait for its unit for ever.
+    /// Writes when the colour has changed, when the previous write failed or was dropped, and once
+    /// a second. May be called at any rate. Bound it with a time limit, because a writer may wait
+    /// for its peripheral without end.
     ///
     /// ```
     /// # use core::convert::Infallible;
@@ -124,12 +128,12 @@ where
     pub fn update(&mut self, signal: &Signal, now: Instant) -> impl Future<Output = ()> {
         let wanted = (self.colour)(signal);
         let is_due = self.shown != Some(wanted) || self.due.is_none_or(|due| now >= due);
-        // Not an async function, which would keep its arguments for as long as a write takes.
+        // Not an `async fn`, which would keep its arguments for the duration of the write.
         async move {
             if !is_due {
                 return;
             }
-            // Given up half way, it shows what nobody knows.
+            // If the write is dropped half way, the state of the lights is unknown.
             self.shown = None;
             let [r, g, b] = wanted;
             if self.writer.write([RGB8 { r, g, b }; N]).await.is_ok() {
@@ -207,7 +211,7 @@ mod tests {
         for millis in 0..5_000 {
             lights.step(Instant::from_millis(millis));
         }
-        // The colour, and again at one to four seconds.
+        // One write for the colour, and repetitions at one to four seconds.
         assert_eq!(lights.writer.writes, vec![[RGB8::new(7, 7, 7)]; 5]);
     }
 
@@ -229,7 +233,7 @@ mod tests {
         }
     }
 
-    /// Begins an update and gives it up.
+    /// Starts an update and drops it.
     fn give_up(lights: &mut Lights<AsyncChain, 1>, signal: &Signal, now: Instant) {
         let write = pin!(lights.update(signal, now));
         assert!(write.poll(&mut Context::from_waker(Waker::noop())).is_pending());

@@ -1,6 +1,7 @@
-//! Lights and sound.
+//! Output of lights and sound.
 //!
-//! What is shown when is decided elsewhere and arrives as a [`Signal`]; here is only how it comes out of a pin.
+//! Which colour or tune is due is decided elsewhere and arrives as a [`Signal`]. This module only
+//! drives the pins.
 
 mod buzzer;
 mod lights;
@@ -12,6 +13,6 @@ use stampfly_types::messages::Signal;
 
 /// Lights or a buzzer.
 pub trait Indicator {
-    /// Shows the signal. Must not block: a tune plays on by itself.
+    /// Shows the signal. Must not wait for the end of a tune.
     fn show(&mut self, signal: &Signal);
 }

@@ -1,8 +1,8 @@
-//! What each tune is made of: pitch and length, one after the other.
+//! The notes of each tune.
 
 use stampfly_types::messages::Tone;
 
-/// A pitch in hertz, zero for a pause, and its length in milliseconds.
+/// Frequency in Hz, zero for a pause, and length in ms.
 pub(super) type Note = (u16, u16);
 
 const PAUSE: u16 = 0;
@@ -12,7 +12,7 @@ const C5: u16 = 523;
 const E5: u16 = 659;
 const G5: u16 = 784;
 
-/// The notes of a tune.
+/// The notes of a tune, in order.
 pub(super) const fn notes(tone: Tone) -> &'static [Note] {
     match tone {
         Tone::None => &[],

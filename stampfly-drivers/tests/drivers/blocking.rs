@@ -1,4 +1,4 @@
-//! A driver on a blocking bus: the same driver, no executor.
+//! A driver on a blocking bus, without an executor.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -13,7 +13,7 @@ thread_local! {
     static NOW: Cell<u64> = const { Cell::new(0) };
 }
 
-/// Like that of many a board it cannot be cloned.
+/// Not `Clone`, like the delays of many boards.
 struct Delay;
 
 impl DelayNs for Delay {

@@ -1,4 +1,4 @@
-//! A bus that never answers: every transfer ends within the limit of its length.
+//! A bus that never answers: every transfer ends within the limit for its length.
 
 use embedded_hal_async::{i2c, spi};
 use stampfly_driver_fakes::closure::{Access, Clock, Fault, I2cBus, SpiBus, finish};
@@ -16,7 +16,7 @@ use stampfly_drivers::chip::{AxisMap, ChipError, TransferLimit};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Duration;
 
-/// A bus of either kind on which every transfer fails.
+/// An I2C or SPI bus on which every transfer fails.
 struct Broken {
     clock: Clock,
     fault: Fault,
@@ -65,17 +65,18 @@ fn a_transfer_is_given_up_at_its_limit_and_not_before() {
 #[test]
 fn what_the_flight_band_reads_ends_well_within_its_period() {
     let [spi, i2c] = [TransferLimit::SPI_SENSORS, TransferLimit::I2C_SENSORS];
-    // Both sensors once, and four frames of the FIFO.
+    // One sample of both sensors, and four frames of the FIFO.
     assert!(spi.of(12) <= Duration::from_micros(350) && spi.of(52) <= Duration::from_micros(450), "{:?}", spi.of(52));
     assert!((1..=256).all(|bytes| spi.of(bytes) <= Duration::from_millis(1)), "everything a driver sends at once");
-    // At 100 kHz a byte takes nine clocks; nothing that is merely slow is given up.
+    // At 100 kHz a byte takes nine clocks; a transfer that is merely slow is not given up.
     assert!(
         (1..=256).all(|bytes| i2c.of(bytes).as_micros() >= bytes as u64 * 90 && i2c.of(bytes).as_micros() <= 35_000)
     );
     assert_eq!(spi.of(usize::MAX), Duration::from_micros(u64::MAX), "no overflow");
 }
 
-/// Calls a driver a hundred times on a bus that fails for ever: how long the longest call took, and that all failed.
+/// Calls a driver a hundred times on a bus that always fails. Returns the duration of the longest
+/// call, and asserts that all failed.
 macro_rules! worst {
     ($clock:ident, $driver:expr) => {{
         let mut driver = $driver;
@@ -151,7 +152,8 @@ fn a_storm_of_refusals_and_a_bus_that_hangs_cost_bounded_time_in_every_driver() 
                 clock.now().since(begun)
             },
         ];
-        // The flow and the range sensor first leave their chips the time to start up. The radio: a hundred calls.
+        // The flow and range sensors first wait for the start-up of their chips. The radio: a
+        // hundred calls.
         let milliseconds = [1, 1, 11, 11, 11, 15, 4, 60, 125, 10, 40];
         let limits = milliseconds.map(Duration::from_millis);
         for (worst, limit) in worst.into_iter().zip(limits) {

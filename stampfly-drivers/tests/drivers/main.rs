@@ -1,4 +1,4 @@
-//! What holds for every driver. One binary, because each would link the drivers again:
+//! Tests for all drivers. They are one binary, because each binary would link the drivers again;
 //! `cargo test -p stampfly-drivers --test drivers limits` runs one file.
 
 mod blocking;

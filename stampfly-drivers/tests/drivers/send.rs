@@ -1,7 +1,9 @@
-//! A driver's future goes to another thread when bus, pin and clock may: the compiler says so for each driver, and one runs there.
+//! The future of a driver is `Send` when its bus, pin and clock are. The compiler checks this for
+//! each driver, and one runs on another thread.
 //!
-//! That holds for drivers of a known bus. A function over `impl Imu` cannot say it of the futures of its argument; it takes the driver's own
-//! type, or runs where it was made.
+//! This holds for drivers with a concrete bus. A function that takes `impl Imu` cannot require it
+//! of the futures of its argument: it has to take the driver's own type, or run on the thread that
+//! made the driver.
 
 use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
@@ -21,7 +23,7 @@ use stampfly_drivers::task::{Backoff, SensorHealth, run_sensor};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder};
 use stampfly_types::Instant;
 
-/// Nobody answers, and no time passes.
+/// A bus without devices, and a clock that stands still.
 struct Board;
 
 impl i2c::ErrorType for Board {

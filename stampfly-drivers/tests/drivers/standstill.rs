@@ -1,6 +1,8 @@
-//! A time base whose clock stands still, while its delays end at once or after their time: every call ends all the same, and says so.
+//! A time base whose clock stands still, while its delays return at once or after their time. Every
+//! call must return an error.
 //!
-//! Nothing a driver could do with such a clock is right: a deadline never comes. What must not be is that it asks the chip for ever.
+//! No deadline passes with such a clock, so a driver cannot work. It must not poll the chip without
+//! end, however.
 
 use core::cell::Cell;
 use embedded_hal_async::delay::DelayNs;
@@ -16,10 +18,10 @@ use stampfly_drivers::chip::{AxisMap, ChipError};
 use stampfly_drivers::{Barometer, Imu, Magnetometer, OpticalFlow, PowerMonitor, RangeFinder, Timebase};
 use stampfly_types::Instant;
 
-/// So often may a call wait.
+/// Maximum number of waits in a call.
 const ENOUGH: u32 = 20_000;
 
-/// It is always the same time. Whoever waits too often polls for ever.
+/// A clock that stands still. Panics after too many waits, which would be an endless loop.
 #[derive(Default)]
 struct Stopped(Cell<u32>);
 

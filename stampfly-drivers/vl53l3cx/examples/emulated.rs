@@ -1,4 +1,5 @@
-//! Two VL53L3CX emulated down to their registers, on this PC, on one bus: each is moved from the address that both start at.
+//! Runs two drivers on register-level emulations of two VL53L3CX on one bus, on this PC. Each chip
+//! is moved from the boot address that both start at.
 //!
 //! `cargo run -p stampfly-vl53l3cx --example emulated-vl53l3cx`, in the repository.
 
@@ -27,7 +28,8 @@ fn main() {
         assert!(floor.distance < 0.1, "the vehicle stands on it");
     }
 
-    // A third one cannot range by itself: the driver notices, for there is a floor, and works from histograms.
+    // A third chip yields no useful distances by itself. There is a floor in range, so the driver
+    // detects this and changes to histograms.
     let bus = I2cBus::new(&clock, 2);
     let (chip, xshut) = chips::Vl53l3cx::new(&simulation.world, &clock, 2, Mount::Bottom);
     bus.attach(Vl53l3cx::BOOT_ADDRESS, chip).set_flaw(Some(Flaw::LightMode(Nonsense::Blind)));

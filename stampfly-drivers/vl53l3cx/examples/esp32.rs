@@ -1,8 +1,10 @@
-//! A VL53L3CX on an ESP32-C6, without an executor: SDA at GPIO6, SCL at GPIO7, XSHUT at GPIO10. Shows the distance
-//! on the serial port.
+//! A VL53L3CX on an ESP32-C6 without an executor. Prints the distance on the serial port.
 //!
-//! `stampfly-drivers/boards/esp32` has the versions of the crates and the linker's settings: `cargo run --release --example vl53l3cx` there. On
-//! another ESP32 only the pins' names change.
+//! Wiring: SDA GPIO6, SCL GPIO7, XSHUT GPIO10.
+//!
+//! Build it in `stampfly-drivers/boards/esp32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example vl53l3cx`. On another ESP32 only the names of
+//! the pins differ.
 
 #![no_std]
 #![no_main]

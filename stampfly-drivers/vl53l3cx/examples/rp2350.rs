@@ -1,7 +1,9 @@
-//! A VL53L3CX on a Raspberry Pi Pico 2: SDA at GP4, SCL at GP5, XSHUT at GP6. Shows the distance
-//! through the debug probe.
+//! A VL53L3CX on a Raspberry Pi Pico 2. Prints the distance through the debug probe.
 //!
-//! `stampfly-drivers/boards/rp2350` has the versions of the crates and the linker's settings: `cargo run --release --example vl53l3cx` there.
+//! Wiring: SDA GP4, SCL GP5, XSHUT GP6.
+//!
+//! Build it in `stampfly-drivers/boards/rp2350`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example vl53l3cx`.
 
 #![no_std]
 #![no_main]

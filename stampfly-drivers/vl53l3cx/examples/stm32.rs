@@ -1,7 +1,9 @@
-//! A VL53L3CX on an STM32F411 (a "Black Pill"): SDA at PB9, SCL at PB8, XSHUT at PB7. Shows the distance
-//! through the debug probe.
+//! A VL53L3CX on an STM32F411 ("Black Pill"). Prints the distance through the debug probe.
 //!
-//! `stampfly-drivers/boards/stm32` has the versions of the crates and the linker's settings: `cargo run --release --example vl53l3cx` there.
+//! Wiring: SDA PB9, SCL PB8, XSHUT PB7.
+//!
+//! Build it in `stampfly-drivers/boards/stm32`, which contains the versions of the crates and the
+//! linker settings: `cargo run --release --example vl53l3cx`.
 
 #![no_std]
 #![no_main]

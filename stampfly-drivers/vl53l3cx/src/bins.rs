@@ -1,76 +1,90 @@
-//! From the counts of a histogram to a distance: ambient light, pulse, sub-bin position, noise, status. Pure functions without a bus.
+//! Distance from a photon histogram: ambient light, pulse, sub-bin position, noise, status.
 //!
-//! Use it to work on recorded histograms; the driver uses it in [`Ranging::Histogram`](crate::Ranging). Not for the light mode, whose chip does
-//! this itself ([`Reading::decode`](crate::Reading::decode)).
+//! Pure functions without a bus. Use them to process recorded histograms; the driver uses them in
+//! [`Ranging::Histogram`](crate::Ranging). Not for the light mode, in which the chip computes the
+//! distance ([`Reading::decode`](crate::Reading::decode)).
 //!
-//! The chip counts photons in bins of one PLL clock each, 1.3 ns or 20 cm of distance, and a laser pulse is 2.5 bins long. Measurements
-//! take turns: the [first part](Part::First) has four bins of ambient light and then the 20 of its laser's period, the [second](Part::Second)
-//! the 24 of its own. A target beyond a period appears too close, and in each part at another place: that is how it is found out.
+//! The chip counts photons in bins of one PLL clock, 1.3 ns or 20 cm of distance. A laser pulse is
+//! 2.5 bins long. Two kinds of measurements alternate: the [first part](Part::First) has four bins
+//! of ambient light followed by the 20 bins of its laser period, the [second](Part::Second) has the
+//! 24 bins of its own. A target beyond a laser period appears too close, and at different distances
+//! in the two parts; comparing them detects it.
 //!
-//! **Unverified** on a chip. What a register means, the laser's periods, the phase at no distance and the gain are from the core that ST
-//! publishes for this part under BSD-3-Clause (VL53LX bare driver: `vl53lx_hist_map.h`, `vl53lx_api_core.c`, `vl53lx_core.c`,
-//! `vl53lx_hist_funcs.c`). How a pulse is found and its noise estimated is this file's own.
+//! **Unverified** on a chip. The meaning of the registers, the laser periods, the phase at zero
+//! distance and the gain are from the core that ST publishes for this part under BSD-3-Clause
+//! (VL53LX bare driver: `vl53lx_hist_map.h`, `vl53lx_api_core.c`, `vl53lx_core.c`,
+//! `vl53lx_hist_funcs.c`). The pulse detection and the noise estimate are original.
 
 use crate::codec::{RangeStatus, Reading};
 use stampfly_types::math;
 
-/// From the interrupt's status at 0x0088 to the last byte of the last bin at 0x00DA (`vl53lx_hist_map.h`).
+/// Length of the block from the interrupt status at 0x0088 to the last byte of the last bin at
+/// 0x00DA (`vl53lx_hist_map.h`).
 pub const BLOCK_BYTES: usize = 83;
 /// Bins of a histogram.
 pub const BINS: usize = 24;
-/// The most that a bin counts: 24 bits. Four times a sum of all has 31.
+/// Maximum count of a bin: 24 bits. Four times the sum of all bins has 31 bits.
 const FULL: u32 = 0xFF_FFFF;
-/// Bins of ambient light that the first part begins with.
+/// Number of bins of ambient light at the start of the first part.
 const AMBIENT_BINS: usize = 4;
-/// Periods of the laser in which a macro period counts (`VL53LX_RANGING_WINDOW_VCSEL_PERIODS`).
+/// Laser periods per macro period in which photons are counted
+/// (`VL53LX_RANGING_WINDOW_VCSEL_PERIODS`).
 const COUNTED_PERIODS: f32 = 2048.0;
-/// Phases of a bin (`VL53LX_hist_calc_zero_distance_phase`).
+/// Phase units per bin (`VL53LX_hist_calc_zero_distance_phase`).
 const PHASES: f32 = 2048.0;
-/// Length of the laser's pulse in bins: 0x004A and 0x0034 of the preset, sixteenths (`VL53LX_get_histogram_bin_data`).
+/// Length of the laser pulse in bins: registers 0x004A and 0x0034 of the preset, in sixteenths
+/// (`VL53LX_get_histogram_bin_data`).
 const PULSE: f32 = 2.5;
-/// What light travels in air in a microsecond, there and back, m (`VL53LX_SPEED_OF_LIGHT_IN_AIR`).
+/// Distance per microsecond of time of flight in air, m, half the way of the light
+/// (`VL53LX_SPEED_OF_LIGHT_IN_AIR`).
 const HALF_LIGHT: f32 = 149.852;
-/// What ST multiplies every histogram's distance by, 1987 of 2048 (`VL53LX_TUNINGPARM_HIST_GAIN_FACTOR_DEFAULT`).
+/// Gain that ST applies to every histogram distance, 1987/2048
+/// (`VL53LX_TUNINGPARM_HIST_GAIN_FACTOR_DEFAULT`).
 const GAIN: f32 = 1_987.0 / 2_048.0;
-/// A bin with more than so many standard deviations of the ambient light above it belongs to a pulse: one in 10⁹ without one. ST takes 6.25.
+/// Detection threshold of a bin in standard deviations of the ambient light: a false alarm
+/// probability of 10⁻⁹. ST uses 6.25.
 const THRESHOLD: f32 = 6.0;
-/// And no less than so many counts above it (`VL53LX_TUNINGPARM_HIST_MIN_AMB_THRESH_EVENTS_DEFAULT`).
+/// Minimum of that threshold, counts (`VL53LX_TUNINGPARM_HIST_MIN_AMB_THRESH_EVENTS_DEFAULT`).
 const FEWEST: f32 = 16.0;
-/// Counts of a pulse that are taken for a target (`VL53LX_TUNINGPARM_HIST_SIGNAL_TOTAL_EVENTS_LIMIT_DEFAULT`).
+/// Minimum counts of a pulse that is accepted as a target
+/// (`VL53LX_TUNINGPARM_HIST_SIGNAL_TOTAL_EVENTS_LIMIT_DEFAULT`).
 const WEAKEST: f32 = 100.0;
-/// Bins that a pulse covers at most, with the bins beside it.
+/// Maximum width of a pulse in bins, including the adjacent bins.
 const WIDEST: usize = 6;
-/// What a measurement is not better than, m (`VL53LX_TUNINGPARM_HIST_SIGMA_EST_REF_MM_DEFAULT`).
+/// Lower bound of the standard deviation, m (`VL53LX_TUNINGPARM_HIST_SIGMA_EST_REF_MM_DEFAULT`).
 const BEST_SIGMA: f32 = 0.001;
-/// Above this a distance is not vouched for, m (`VL53LX_TUNINGPARM_HIST_SIGMA_THRESH_MM_DEFAULT`, in quarters).
+/// Standard deviation above which a distance is invalid, m
+/// (`VL53LX_TUNINGPARM_HIST_SIGMA_THRESH_MM_DEFAULT`, in quarters).
 const WORST_SIGMA: f32 = 0.045;
-/// How far a target may seem behind the sensor and how far away it may be, bins (`VL53LX_preset_mode_histogram_long_range`).
+/// Accepted range of a target in bins; negative values are apparent positions behind the sensor
+/// (`VL53LX_preset_mode_histogram_long_range`).
 const SHORTEST: f32 = -1.0;
 const FURTHEST: f32 = 17.0;
-/// By how much the two parts may disagree, bins (`VL53LX_TUNINGPARM_CONSISTENCY_HIST_PHASE_TOLERANCE_DEFAULT`).
+/// Tolerance between the two parts, bins
+/// (`VL53LX_TUNINGPARM_CONSISTENCY_HIST_PHASE_TOLERANCE_DEFAULT`).
 const TOLERANCE: f32 = 1.0;
 
-/// The furthest distance that is vouched for, m: 17 bins.
+/// Largest valid distance, m: 17 bins.
 pub const REACH: f32 = 3.2;
 
-/// Which of the two measurements that take turns.
+/// One of the two alternating kinds of measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Part {
-    /// Even numbers: a laser period of 20 bins, after four of ambient light.
+    /// Even numbers: a laser period of 20 bins, after four bins of ambient light.
     First,
     /// Odd numbers: a laser period of 24 bins.
     Second,
 }
 
 impl Part {
-    /// The part that the measurement of this number is.
+    /// The part of the measurement with this number.
     #[must_use]
     pub const fn of(count: u8) -> Self {
         if count & 1 == 0 { Self::First } else { Self::Second }
     }
 
-    /// Period of the laser, in bins.
+    /// Laser period in bins.
     #[must_use]
     pub const fn period(self) -> usize {
         match self {
@@ -80,32 +94,33 @@ impl Part {
     }
 }
 
-/// What a histogram was measured with.
+/// Timing of a histogram measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Exposure {
-    /// The fast oscillator as the factory measured it, register 0x0006: MHz with 12 bits after the point.
+    /// Frequency of the fast oscillator, measured by the factory, register 0x0006: MHz with 12
+    /// fractional bits.
     pub oscillator: u16,
-    /// Macro periods that were counted: of the first part and of the second.
+    /// Number of macro periods of the first and of the second part.
     pub macro_periods: [u16; 2],
-    /// Where in its period the laser was told to start, register 0x0047, bins.
+    /// Start of the laser pulse within its period as configured, register 0x0047, bins.
     pub laser_start: u8,
 }
 
 impl Exposure {
-    /// A bin's duration, µs: a period of the PLL, which makes 64 of one of the oscillator.
+    /// Duration of a bin, µs: one period of the PLL, which multiplies the oscillator by 64.
     #[must_use]
     pub fn bin(&self) -> f32 {
         64.0 / f32::from(self.oscillator.max(1))
     }
 
-    /// A bin's distance, m.
+    /// Distance of a bin, m.
     #[must_use]
     pub fn bin_length(&self) -> f32 {
         self.bin() * HALF_LIGHT * GAIN
     }
 
-    /// For how long a bin of this part was counted in all, µs.
+    /// Total counting time of a bin in this part, µs.
     fn counted(&self, part: Part) -> f32 {
         let [first, second] = self.macro_periods;
         let periods = match part {
@@ -116,37 +131,37 @@ impl Exposure {
     }
 }
 
-/// A measurement as the chip gives it.
+/// A histogram as read from the chip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Histogram {
-    /// The status register's code.
+    /// Code of the status register.
     pub code: u8,
-    /// Number of the measurement since the start; goes from 255 to 128.
+    /// Number of the measurement since the start; 255 is followed by 128.
     pub count: u8,
-    /// Detectors in use.
+    /// Number of detectors in use.
     pub detectors: f32,
-    /// Photons in each bin, no more than 24 bits.
+    /// Photon count of each bin, at most 24 bits.
     pub bins: [u32; BINS],
-    /// Where the chip found its own reference pulse, in 2048ths of a bin.
+    /// Position of the chip's reference pulse, in 2048ths of a bin.
     pub reference_phase: u16,
-    /// Where the laser started for that, bins.
+    /// Start of the laser pulse for the reference, bins.
     pub reference_start: u8,
 }
 
-/// Where a pulse is.
+/// A detected pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pulse {
-    /// Bins from the first to where half of its counts lie.
+    /// Median position of the pulse, in bins from the start of the period.
     middle: f32,
-    /// Variance of that.
+    /// Variance of the position, bins².
     variance: f32,
     /// Counts above the ambient light.
     counts: f32,
 }
 
 impl Histogram {
-    /// Takes the block apart; `None` when nobody drives the bus: every byte the same, all ones or all zeros.
+    /// Decodes the block. `None` when no chip drives the bus: all bytes ones or all zeros.
     ///
     /// ```
     /// use stampfly_vl53l3cx::bins::{BLOCK_BYTES, Histogram, Part};
@@ -157,7 +172,7 @@ impl Histogram {
     /// assert_eq!((histogram.part(), histogram.bins[0], histogram.bins[1]), (Part::Second, 90, 0));
     /// ```
     #[must_use]
-    // In flash once: compilers put it into the state machine of each caller, and unroll it there.
+    // Keeps one copy in flash: compilers inline and unroll it in the state machine of each caller.
     #[inline(never)]
     pub fn decode(block: &[u8; BLOCK_BYTES]) -> Option<Self> {
         if *block == [0xFF; BLOCK_BYTES] || *block == [0; BLOCK_BYTES] {
@@ -169,7 +184,8 @@ impl Histogram {
             *bin = bytes.iter().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
         }
         let [.., p1, p0, start, high, low] = *block;
-        // The lowest byte of the last bin has lost its place to the phase (`VL53LX_get_histogram_bin_data`).
+        // The phase occupies the place of the last bin's lowest byte
+        // (`VL53LX_get_histogram_bin_data`).
         if let Some(last) = bins.last_mut() {
             *last = (*last & !0xFF) | u32::from((high << 2).wrapping_add(low));
         }
@@ -183,20 +199,21 @@ impl Histogram {
         })
     }
 
-    /// Which part this is.
+    /// The part of this measurement.
     #[must_use]
     pub const fn part(&self) -> Part {
         Part::of(self.count)
     }
 
-    /// Four times what a bin of the laser's period has more than this, which is four times the ambient light. Places go around.
+    /// Four times the count of a bin of the laser period, less `ambient`, four times the ambient
+    /// count. `place` wraps around at the end of the period.
     fn above(&self, place: usize, ambient: i32) -> i32 {
         let period = self.part().period();
         let bin = self.bins.get(BINS - period + place % period).copied().unwrap_or(0);
         (4 * bin.min(FULL)) as i32 - ambient
     }
 
-    /// Four times the counts of ambient light in a bin, and the variance of one such count.
+    /// Four times the ambient count of a bin, and the variance of that count.
     #[inline(never)]
     fn ambient(&self) -> (i32, f32) {
         match self.part() {
@@ -204,23 +221,23 @@ impl Histogram {
                 let sum: u32 = self.bins.iter().take(AMBIENT_BINS).map(|bin| (*bin).min(FULL)).sum();
                 (sum as i32, sum as f32 / (4 * AMBIENT_BINS) as f32)
             }
-            // The middle one of those that no pulse reaches.
+            // The median of the bins that a pulse cannot cover.
             Part::Second => {
                 let rank = (BINS - WIDEST) / 2;
                 let below = |value: &u32| self.bins.iter().filter(|bin| *bin < value).count();
                 let middle = self.bins.iter().filter(|bin| below(bin) <= rank).max().copied().unwrap_or(0).min(FULL);
-                // Of a median: π/2 of a mean's.
+                // The variance of a median is π/2 times that of a mean.
                 (4 * middle as i32, middle as f32 * core::f32::consts::FRAC_PI_2 / (BINS - WIDEST) as f32)
             }
         }
     }
 
-    /// The strongest pulse that stands above this ambient light.
+    /// The strongest pulse above this ambient light.
     #[inline(never)]
     fn pulse(&self, ambient: i32, of_ambient: f32) -> Option<Pulse> {
         let period = self.part().period();
         let threshold = (4.0 * (THRESHOLD * math::sqrt(ambient as f32 / 4.0)).max(FEWEST)) as i32;
-        // A place outside of every pulse to begin at, for one may reach around the end of the period.
+        // Starts outside every pulse, because one may extend across the end of the period.
         let begin = (0..period).find(|place| self.above(*place, ambient) <= threshold)?;
         let (mut most, mut strongest, mut sum, mut from) = (0, None, 0, 0);
         for place in begin..=begin + period {
@@ -235,17 +252,19 @@ impl Histogram {
                 sum = 0;
             }
         }
-        // The bins beside it have the edges of the pulse.
+        // The adjacent bins contain the edges of the pulse.
         let (from, until) = strongest?;
         let window = from + period - 1..from + period + (until - from + 1).min(period - 1);
         let counts: i32 = window.clone().map(|place| self.above(place, ambient)).sum();
+        // Finds the bin in which the cumulative count reaches half of the total.
         let (mut before, mut bins) = (0, 0.0);
         for place in window.clone() {
             let own = self.above(place, ambient);
             let after = counts - before - own;
             if own > 0 && before + own >= after {
-                // The middle is at ½ + (after − before) / 2 own: what each sum varies by, as a Poisson process, and what the ambient
-                // light taken off it varies by.
+                // The median is at ½ + (after − before) / 2 own. Its variance has two parts: the
+                // Poisson noise of each sum, and the noise of the ambient light that was
+                // subtracted.
                 let width = window.len() as f32;
                 let [before, own, after, ambient] = [before, own, after, ambient].map(|fourfold| fourfold as f32 / 4.0);
                 let beside = before + after + (width - 1.0) * ambient;
@@ -262,21 +281,24 @@ impl Histogram {
         None
     }
 
-    /// How far from no distance the middle of the pulse is, in bins, within the period.
+    /// Time of flight to the middle of the pulse in bins, modulo the laser period.
     fn travelled(&self, middle: f32, laser_start: u8) -> f32 {
         let period = self.part().period() as f32;
+        // The chip may measure its reference with another start of the laser than the target.
         let start = f32::from(self.reference_start) - f32::from(laser_start);
         let zero = f32::from(self.reference_phase) / PHASES + start;
         let travelled = middle - zero;
         let travelled = travelled - period * math::floor(travelled / period);
-        // A little behind the sensor, by noise or by an offset.
+        // Noise or an offset can place a target slightly behind the sensor.
         if travelled > period + SHORTEST { travelled - period } else { travelled }
     }
 
-    /// The measurement in the terms of the light mode, and how many bins the light travelled, which the next one is told as `before`;
-    /// `None` without a target. `offset` is what the factory found to be missing, m.
+    /// Evaluates the histogram in the terms of the light mode. Also returns the time of flight in
+    /// bins, to be passed as `before` to the next evaluation; `None` without a target. `offset` is
+    /// the factory's correction, m.
     ///
-    /// It is [`RangeStatus::Valid`] when the measurement before, which is of the other part, saw the target at the same distance; without one
+    /// The status is [`RangeStatus::Valid`] when the previous measurement, which is of the other
+    /// part, found the target at the same distance. Without a previous one it is
     /// [`RangeStatus::NotCheckedForWrap`].
     ///
     /// ```
@@ -292,7 +314,7 @@ impl Histogram {
     /// assert!((reading.distance - 0.96).abs() < 0.01 && reading.sigma < 0.01);
     /// ```
     #[must_use]
-    // In flash once: compilers put it into the state machine of each caller, and unroll it there.
+    // Keeps one copy in flash: compilers inline and unroll it in the state machine of each caller.
     #[inline(never)]
     pub fn reading(&self, exposure: &Exposure, offset: f32, before: Option<f32>) -> (Reading, Option<f32>) {
         let (ambient, of_ambient) = self.ambient();
@@ -315,6 +337,7 @@ impl Histogram {
         };
         let travelled = self.travelled(pulse.middle, exposure.laser_start);
         let length = exposure.bin_length();
+        // Per time of the pulse, as the chip reports it in the light mode.
         reading.signal_rate = pulse.counts / (counted * PULSE);
         reading.sigma = math::sqrt(pulse.variance * length * length + BEST_SIGMA * BEST_SIGMA);
         reading.distance = travelled * length + offset * GAIN;
@@ -341,7 +364,8 @@ mod tests {
     const EXPOSURE: Exposure = Exposure { oscillator: 48_333, macro_periods: [85, 71], laser_start: 9 };
     const AMBIENT: f64 = 40.0;
 
-    /// A rectangle of 2.5 bins with this many photons, its middle so many bins after the start of the period, without noise.
+    /// A rectangular pulse of 2.5 bins with this number of photons, without noise. `middle` is in
+    /// bins from the start of the period.
     fn histogram(count: u8, middle: f64, photons: f64) -> Histogram {
         let part = Part::of(count);
         let (first, period) = (BINS - part.period(), part.period() as f64);
@@ -372,7 +396,7 @@ mod tests {
                 let (_, travelled) = histogram(count, middle, 50_000.0).reading(&EXPOSURE, 0.0, None);
                 let expected = (middle - 4.0).rem_euclid(period);
                 let error = f64::from(travelled.expect("a pulse")) - expected;
-                // Where the whole period is as good as none.
+                // An error of a whole period counts as zero.
                 let error = if error.abs() > period / 2.0 { error.abs() - period } else { error };
                 assert!(error.abs() < 0.002, "{middle} of part {count}: {error}");
             }
@@ -386,11 +410,11 @@ mod tests {
         let (second, _) = histogram(1, 9.3, 2_000.0).reading(&EXPOSURE, 0.0, travelled);
         assert_eq!(second.status(), RangeStatus::Valid);
         assert!((second.distance - 5.3 * EXPOSURE.bin_length()).abs() < 0.002, "{second:?}");
-        // 25 bins away: 5 in one part, 1 in the other.
+        // 25 bins: 5 in one part, 1 in the other.
         let (_, near) = histogram(0, 9.0, 2_000.0).reading(&EXPOSURE, 0.0, None);
         let (wrapped, _) = histogram(1, 5.0, 2_000.0).reading(&EXPOSURE, 0.0, near);
         assert_eq!(wrapped.status(), RangeStatus::WrapAround);
-        // 18 bins away, the same in both.
+        // 18 bins: the same in both parts.
         let (_, far) = histogram(0, 2.0, 2_000.0).reading(&EXPOSURE, 0.0, None);
         let (beyond, _) = histogram(1, 22.0, 2_000.0).reading(&EXPOSURE, 0.0, far);
         assert_eq!(beyond.status(), RangeStatus::OutOfBounds);
@@ -404,7 +428,8 @@ mod tests {
         assert!((longer.distance - plain.distance - 0.0097).abs() < 1e-5);
         let (nearer, _) = shifted(11).reading(&EXPOSURE, 0.0, None);
         assert!((plain.distance - nearer.distance - 2.0 * EXPOSURE.bin_length()).abs() < 1e-5);
-        // 85 macro periods of 2048 bins of 1.324 ns: 0.2305 ms of ambient light, 2.5 times that of the laser's.
+        // 85 macro periods of 2048 bins of 1.324 ns are 0.2305 ms of ambient light; the laser's
+        // rate refers to 2.5 times that.
         assert!((plain.ambient_rate - 40.0 / 230.5).abs() < 1e-3, "{plain:?}");
         assert!((plain.signal_rate - 3_000.0 / 576.3).abs() < 0.02, "{plain:?}");
         assert!((EXPOSURE.bin_length() - 0.1925).abs() < 1e-4);
@@ -416,7 +441,7 @@ mod tests {
             let (reading, travelled) = histogram(count, 9.0, photons).reading(&EXPOSURE, 0.0, None);
             assert_eq!((reading.status(), travelled), (RangeStatus::SignalTooLow, None), "{photons}");
         }
-        // No bin of the laser's period is as dark as the ambient ones.
+        // No bin of the laser period is as dark as the ambient bins.
         let mut bins = [9_000; BINS];
         bins[..4].fill(10);
         let flooded = Histogram { bins, ..histogram(0, 9.0, 0.0) };

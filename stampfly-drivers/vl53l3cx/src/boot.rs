@@ -1,15 +1,18 @@
-//! Who may start at the address that all chips of the family start at.
+//! Access to the common boot address of several chips on one bus.
 //!
-//! Two of them on a bus answer at 0x29 after every start and are moved elsewhere one by one, the others in reset. That
-//! holds for the first start and for every later one: after a brown-out both may be back at once. So whoever wakes a
-//! chip holds the address until it has moved on; and before it lets its own chip out of reset it asks whether somebody
-//! answers there already. A chip without a pin ([`NoXshut`](crate::NoXshut)) is at that address from power-on until its driver has moved it.
+//! Every chip of the family answers at 0x29 after a start. The drivers wake their chips one by one,
+//! with the others held in reset, and move each to its own address. This applies to every later
+//! start as well: after a brown-out two chips may be back at 0x29 at the same time. A driver
+//! therefore holds the boot address until its chip has moved, and checks that no chip answers there
+//! before it releases its own from reset. A chip without a pin ([`NoXshut`](crate::NoXshut)) is at
+//! 0x29 from power-on until its driver has moved it.
 
 use crate::xshut::Xshut;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// The boot address of a bus: one for all sensors on it, lent to each. It may be a `static`. On cores without an atomic exchange
-/// (Cortex-M0, RISC-V without `A`) the drivers of one bus belong into tasks that do not interrupt each other.
+/// The boot address of a bus, shared by all drivers on it. It may be a `static`. On cores without
+/// an atomic exchange (Cortex-M0, RISC-V without `A`) the drivers of one bus must be in tasks that
+/// do not preempt each other.
 ///
 /// ```
 /// use stampfly_vl53l3cx::BootAddress;
@@ -23,24 +26,24 @@ pub struct BootAddress {
 }
 
 impl BootAddress {
-    /// A bus with every sensor in reset.
+    /// The boot address of a bus with every sensor in reset.
     #[must_use]
     pub const fn new() -> Self {
         Self { taken: AtomicBool::new(false) }
     }
 
-    /// Is a sensor waking up right now?
+    /// Whether a sensor is being woken.
     #[must_use]
     pub fn is_taken(&self) -> bool {
         self.taken.load(Ordering::Acquire)
     }
 
-    /// The address, with the pin of the chip that is to wake there; `None` while another has it.
+    /// Acquires the address for the chip with this pin; `None` while another driver holds it.
     pub(super) fn take<'a, X: Xshut>(&'a self, xshut: &'a mut X) -> Option<Waking<'a, X>> {
         if self.exchange() { None } else { Some(Waking { boot: self, xshut, awake: false }) }
     }
 
-    /// Takes the address, and says whether it was taken before.
+    /// Marks the address as taken, and returns whether it was taken before.
     fn exchange(&self) -> bool {
         #[cfg(target_has_atomic = "8")]
         return self.taken.swap(true, Ordering::AcqRel);
@@ -53,7 +56,7 @@ impl BootAddress {
     }
 }
 
-/// A chip that wakes up. Dropped before it has moved on, whatever the reason, it is back in reset.
+/// A chip that is being woken. If it is dropped before the chip has moved, the chip is reset.
 pub(super) struct Waking<'a, X: Xshut> {
     boot: &'a BootAddress,
     xshut: &'a mut X,
@@ -61,12 +64,12 @@ pub(super) struct Waking<'a, X: Xshut> {
 }
 
 impl<X: Xshut> Waking<'_, X> {
-    /// Out of reset.
+    /// Releases the chip from reset.
     pub(super) fn release(&mut self) -> Result<(), X::Error> {
         self.xshut.release()
     }
 
-    /// It answers at its own address: the boot address is free again.
+    /// Frees the boot address, because the chip now answers at its own address.
     pub(super) fn moved(mut self) {
         self.awake = true;
     }
@@ -75,7 +78,7 @@ impl<X: Xshut> Waking<'_, X> {
 impl<X: Xshut> Drop for Waking<'_, X> {
     fn drop(&mut self) {
         if !self.awake {
-            // A pin that refuses is reported at the next start, which sets it low first.
+            // The next start reports a pin that refuses, because it sets the pin low first.
             let _ = self.xshut.hold();
         }
         self.boot.taken.store(false, Ordering::Release);

@@ -1,9 +1,10 @@
 //! Registers, formulas and the result block of the VL53L3CX.
 //!
-//! The data sheet (ST DS13204) documents the identification, the start-up and the electrical side only. Everything else
-//! here is **unverified** against it: names and addresses of the register map that ST publishes for this family with
-//! its VL53L1 and VL53LX drivers, and values that public drivers of the family write. The times of the two ranging
-//! parts are a formula of ours that meets the published values at 33 ms.
+//! The data sheet (ST DS13204) documents only the identification, the start-up and the electrical
+//! interface. Everything else here is **unverified** against it: names and addresses of the
+//! register map that ST publishes for this family with its VL53L1 and VL53LX drivers, and values
+//! that public drivers of the family write. The times of the two ranging parts are from a formula
+//! of this crate that matches the published values at 33 ms.
 
 use super::config::Config;
 pub use super::config::DistanceMode;
@@ -11,83 +12,90 @@ use stampfly_types::Duration;
 
 /// Register addresses.
 pub mod register {
-    /// Resets the chip: [`HOLD`](super::HOLD), a pause, [`LET_GO`](super::LET_GO), as public drivers of the VL53L1X do.
+    /// Reset: [`HOLD`](super::HOLD), a pause, [`LET_GO`](super::LET_GO), as in public drivers of
+    /// the VL53L1X.
     pub const SOFT_RESET: u16 = 0x0000;
-    /// The address the chip answers at, 7 bits.
+    /// I2C address of the chip, 7 bits.
     pub const I2C_SLAVE_DEVICE_ADDRESS: u16 = 0x0001;
     /// Bounds of the search for the detector's bias voltage.
     pub const VHV_CONFIG_TIMEOUT_MACROP_LOOP_BOUND: u16 = 0x0008;
-    /// Where that search begins.
+    /// Start value of that search.
     pub const VHV_CONFIG_INIT: u16 = 0x000B;
-    /// Added to every distance, quarters of a millimetre, 2 bytes: [`range_offset`](super::range_offset).
+    /// Correction added to every distance, quarters of a millimetre, 2 bytes:
+    /// [`range_offset`](super::range_offset).
     pub const ALGO_PART_TO_PART_RANGE_OFFSET_MM: u16 = 0x001E;
-    /// What the factory found to be missing from this chip's distances, mm, 2 bytes.
+    /// The factory's correction for this chip, mm, 2 bytes.
     pub const MM_CONFIG_OUTER_OFFSET_MM: u16 = 0x0022;
-    /// Polarity of the interrupt, [`ACTIVE_HIGH`](super::ACTIVE_HIGH); its status follows, in bit 0.
+    /// Polarity of the interrupt, [`ACTIVE_HIGH`](super::ACTIVE_HIGH), followed by its status in
+    /// bit 0.
     pub const GPIO_HV_MUX_CTRL: u16 = 0x0030;
-    /// How long the phase calibration takes, macro periods.
+    /// Duration of the phase calibration, macro periods.
     pub const PHASECAL_CONFIG_TIMEOUT_MACROP: u16 = 0x004B;
-    /// Time and period of the first ranging part, the same of the second, then limits.
+    /// Duration and laser period of the first ranging part, the same for the second, then limits.
     pub const RANGE_CONFIG_TIMEOUT_MACROP_A: u16 = 0x005E;
-    /// Time from one measurement to the next, 4 bytes.
+    /// Time between the starts of two measurements, 4 bytes.
     pub const SYSTEM_INTERMEASUREMENT_PERIOD: u16 = 0x006C;
     /// Windows and phases of the distance mode.
     pub const SD_CONFIG_WOI_SD0: u16 = 0x0078;
-    /// Writing [`CLEAR`](super::CLEAR) takes the interrupt back; only then comes the next.
+    /// [`CLEAR`](super::CLEAR) clears the interrupt, which enables the next one.
     pub const SYSTEM_INTERRUPT_CLEAR: u16 = 0x0086;
-    /// Starts and stops: [`RANGING`](super::RANGING), [`STANDBY`](super::STANDBY).
+    /// Start and stop: [`RANGING`](super::RANGING), [`STANDBY`](super::STANDBY).
     pub const SYSTEM_MODE_START: u16 = 0x0087;
-    /// The result begins here.
+    /// First register of the result.
     pub const RESULT_RANGE_STATUS: u16 = 0x0089;
-    /// Ticks of the slow oscillator in a millisecond, 10 bits.
+    /// Ticks of the slow oscillator per millisecond, 10 bits.
     pub const RESULT_OSC_CALIBRATE_VAL: u16 = 0x00DE;
     /// Bit 0: the firmware has started.
     pub const FIRMWARE_SYSTEM_STATUS: u16 = 0x00E5;
-    /// Model; the module type follows.
+    /// Model, followed by the module type.
     pub const IDENTIFICATION_MODEL_ID: u16 = 0x010F;
 }
 
-/// The models of the family that are this part, with module type [`MODULE_TYPE`].
+/// Models of the family with module type [`MODULE_TYPE`] that are this part.
 pub const MODELS: [u8; 3] = [0xEA, 0xEB, 0xEC];
-/// The module type of the VL53L3CX.
+/// Module type of the VL53L3CX.
 pub const MODULE_TYPE: u8 = 0xAA;
-/// Where every chip of the family answers after a start.
+/// Address of every chip of the family after a start.
 pub const BOOT_ADDRESS: u8 = 0x29;
-/// The chip stands still.
+/// Holds the chip in reset.
 pub const HOLD: u8 = 0x00;
-/// The chip starts.
+/// Starts the chip.
 pub const LET_GO: u8 = 0x01;
-/// The interrupt rises when a measurement is there. Reset leaves the opposite, which tells a restarted chip.
+/// The interrupt is high when a measurement is ready. After a reset the bit is zero, which
+/// identifies a chip that restarted.
 pub const ACTIVE_HIGH: u8 = 0x01;
-/// Measure again and again, in the rhythm of the inter-measurement period.
+/// Measures continuously with the inter-measurement period.
 pub const RANGING: u8 = 0x40;
-/// Measure no more.
+/// Stops measuring.
 pub const STANDBY: u8 = 0x00;
 /// The measurement has been read.
 pub const CLEAR: u8 = 0x01;
-/// Two bounds for the bias search, once it has been done.
+/// Bound of the bias search after the first one: two steps.
 pub const SHORT_BIAS_SEARCH: u8 = 0x09;
-/// The bias search begins at the last result.
+/// Start of the bias search at the last result.
 pub const FROM_LAST_BIAS: u8 = 0x00;
-/// The result: status to distance and signal rate, from [`register::RESULT_RANGE_STATUS`].
+/// Length of the result, from the status to distance and signal rate, starting at
+/// [`register::RESULT_RANGE_STATUS`].
 pub const RESULT_BYTES: usize = 17;
-/// How long the two calibrations and the detector selection before a measurement take, µs: fitted to the published
-/// values.
+/// Duration of the two calibrations and the detector selection before a measurement, µs, fitted to
+/// the published values.
 const PREPARATION: u64 = 12_000;
-/// A macro period of a light pulse period of one clock: 2304 periods of the nominal oscillator.
+/// Duration of a macro period per clock of the laser period: 2304 periods of the nominal
+/// oscillator.
 const NANOS_PER_MACRO_CLOCK: u64 = 3_051;
-/// A millisecond.
+/// One millisecond, ns.
 const PHASE_CALIBRATION: u64 = 1_000_000;
-/// Budgets that the formula of the ranging parts meets.
+/// Time budgets, µs, for which the formula of the ranging parts holds.
 const BUDGETS: core::ops::RangeInclusive<u64> = 33_000..=500_000;
 
-/// What does not depend on the configuration: runs of registers that count up from an address.
+/// Settings that do not depend on the configuration: values of consecutive registers from an
+/// address on.
 pub const FIXED: [(u16, &[u8]); 5] = [
-    // Pads at the supply's level, not 1.8 V; interrupt on a new sample, active high.
+    // Pads at the supply voltage instead of 1.8 V; interrupt on a new sample, active high.
     (0x002E, &[0x01, 0x01, ACTIVE_HIGH, 0x02, 0x00, 0x02, 0x08, 0x00, 0x08, 0x10, 0x01, 0x01, 0x00, 0x00, 0x00, 0x00]),
     (0x003E, &[0xFF, 0x00, 0x0F, 0x00, 0x00, 0x00, 0x00, 0x00, 0x20, 0x0B, 0x00, 0x00, 0x02]),
-    // Detectors are selected by the chip, from the whole array.
-    // The times of the mode's corrections, which are left out, are those of ST's preset (`VL53LX_preset_mode_standard_ranging`).
+    // The chip selects detectors from the whole array. The mode corrections are disabled; their
+    // times are those of ST's preset (`VL53LX_preset_mode_standard_ranging`).
     (
         0x004C,
         &[0x21, 0x00, 0x00, 0x05, 0x00, 0x00, 0x00, 0x00, 0xC8, 0x00, 0x00, 0x38, 0xFF, 0x01, 0x00, 0x1A, 0x00, 0x20],
@@ -98,8 +106,8 @@ pub const FIXED: [(u16, &[u8]); 5] = [
 ];
 
 impl DistanceMode {
-    /// Codes of the light pulse periods of the two ranging parts. A target beyond what one of them tells apart appears
-    /// at another distance in the other: that is how the chip notices.
+    /// Codes of the laser periods of the two ranging parts. A target beyond the unambiguous range
+    /// of one part appears at another distance in the other part, by which the chip detects it.
     const fn periods(self) -> [u8; 2] {
         match self {
             Self::Short => [0x07, 0x05],
@@ -124,7 +132,7 @@ impl DistanceMode {
         }
     }
 
-    /// The furthest distance that is vouched for, m.
+    /// Largest valid distance, m.
     #[must_use]
     pub const fn reach(self) -> f32 {
         match self {
@@ -134,7 +142,7 @@ impl DistanceMode {
         }
     }
 
-    /// [`register::SD_CONFIG_WOI_SD0`] and the three after it.
+    /// [`register::SD_CONFIG_WOI_SD0`] and the following three registers.
     #[must_use]
     pub const fn windows(self) -> [u8; 4] {
         let [first, second] = self.periods();
@@ -142,7 +150,7 @@ impl DistanceMode {
     }
 }
 
-/// Can the chip be told so?
+/// Whether the configuration is valid.
 #[must_use]
 pub fn is_possible(config: &Config) -> bool {
     BUDGETS.contains(&config.budget.as_micros())
@@ -162,9 +170,10 @@ const fn rounded(dividend: u64, divisor: u64) -> u64 {
     }
 }
 
-/// A number of macro periods as the chip takes it: eight bits and how often they are doubled.
+/// A number of macro periods in the chip's encoding: eight bits and a binary exponent.
 #[must_use]
 pub const fn encode_timeout(macro_periods: u64) -> u16 {
+    // The chip adds one when it decodes the value.
     let mut mantissa = macro_periods.saturating_sub(1);
     let mut exponent = 0;
     while mantissa > 0xFF {
@@ -174,7 +183,7 @@ pub const fn encode_timeout(macro_periods: u64) -> u16 {
     (exponent << 8) | mantissa as u16
 }
 
-/// [`register::PHASECAL_CONFIG_TIMEOUT_MACROP`]: a millisecond.
+/// [`register::PHASECAL_CONFIG_TIMEOUT_MACROP`] for one millisecond.
 #[must_use]
 pub const fn phase_calibration(mode: DistanceMode) -> u8 {
     let [first, _] = mode.periods();
@@ -184,11 +193,12 @@ pub const fn phase_calibration(mode: DistanceMode) -> u8 {
     }
 }
 
-/// [`register::RANGE_CONFIG_TIMEOUT_MACROP_A`] and what follows: times, limits of 90 mm for the standard deviation and
-/// of one million counts a second for the signal, and the phases that are taken for a target.
+/// [`register::RANGE_CONFIG_TIMEOUT_MACROP_A`] and the registers that follow: times, limits of 90
+/// mm for the standard deviation and of one million counts a second for the signal, and the
+/// accepted phases of a target.
 #[must_use]
 pub const fn ranging(config: &Config) -> [u8; 12] {
-    // What is left of the budget, less a tenth, in two equal parts.
+    // The rest of the budget, less a tenth, in two equal parts.
     let part = config.budget.as_micros().saturating_sub(PREPARATION).saturating_mul(450);
     let [first, second] = config.mode.periods();
     let [a1, a0] = encode_timeout(rounded(part, nanos_per_macro_period(first))).to_be_bytes();
@@ -196,50 +206,55 @@ pub const fn ranging(config: &Config) -> [u8; 12] {
     [a1, a0, first, b1, b0, second, 0x01, 0x68, 0x00, 0x80, 0x08, config.mode.highest_phase()]
 }
 
-/// [`register::SYSTEM_INTERMEASUREMENT_PERIOD`] of a chip whose oscillator is so fast. The factor of 1.075 is the
-/// published drivers'.
+/// [`register::SYSTEM_INTERMEASUREMENT_PERIOD`] for this period and a chip with this oscillator.
+/// The factor of 1.075 is from the published drivers.
 #[must_use]
 pub const fn inter_measurement(period: Duration, oscillator: u16) -> [u8; 4] {
+    // 43/40 is 1.075; the remaining factor of 1000 converts µs to ms.
     let ticks = (oscillator as u64 & 0x3FF).saturating_mul(period.as_micros()).saturating_mul(43) / 40_000;
     (if ticks > u32::MAX as u64 { u32::MAX } else { ticks as u32 }).to_be_bytes()
 }
 
-/// [`register::ALGO_PART_TO_PART_RANGE_OFFSET_MM`] of a chip whose factory found this to be missing, as its register
-/// [`MM_CONFIG_OUTER_OFFSET_MM`](register::MM_CONFIG_OUTER_OFFSET_MM) says. The chip adds it only when it corrects the mode of a measurement, which
-/// [`FIXED`] leaves out; ST's core (`vl53lx_api_core.c`) then moves it here, and so do public drivers of the VL53L1X.
+/// [`register::ALGO_PART_TO_PART_RANGE_OFFSET_MM`] from the factory's correction in register
+/// [`MM_CONFIG_OUTER_OFFSET_MM`](register::MM_CONFIG_OUTER_OFFSET_MM).
+///
+/// The chip applies the factory's correction only with the mode corrections, which [`FIXED`]
+/// disables. ST's core (`vl53lx_api_core.c`) then copies it to this register, as do public drivers
+/// of the VL53L1X.
 #[must_use]
 pub const fn range_offset(outer: [u8; 2]) -> [u8; 2] {
     i16::from_be_bytes(outer).wrapping_mul(4).to_be_bytes()
 }
 
-/// Do the 13 bits that the chip has for [`range_offset`] agree?
+/// Whether the 13 bits that the chip stores of [`range_offset`] are equal.
 #[must_use]
 pub const fn is_offset_kept(wanted: [u8; 2], kept: [u8; 2]) -> bool {
     (u16::from_be_bytes(wanted) ^ u16::from_be_bytes(kept)) & 0x1FFF == 0
 }
 
-/// What the chip says about a measurement.
+/// Status of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RangeStatus {
-    /// A target, at this distance.
+    /// A target at this distance.
     Valid,
     /// The standard deviation is above its limit.
     SigmaTooHigh,
     /// No target: the signal is below its limit.
     SignalTooLow,
-    /// A target closer than the chip measures.
+    /// A target closer than the minimum distance.
     TooClose,
-    /// The phase is outside of the distance mode's limits.
+    /// The phase is outside the limits of the distance mode.
     OutOfBounds,
-    /// The two ranging parts disagree: a target beyond the reach that appears at a lower distance.
+    /// The two ranging parts disagree: a target beyond the range that appears at a shorter
+    /// distance.
     WrapAround,
-    /// A target, but nothing to check it for wrap-around against.
+    /// A target that could not be checked for wrap-around.
     NotCheckedForWrap,
-    /// Two targets that cannot be told apart.
+    /// Two targets that cannot be separated.
     MergedTargets,
-    /// The signal is no more than what the cover glass reflects.
+    /// The signal does not exceed the reflection of the cover glass.
     CoverGlass,
     /// The first measurement after a start, without a result.
     Starting,
@@ -247,12 +262,12 @@ pub enum RangeStatus {
     Hardware,
     /// The chip could not compute a distance.
     Processing,
-    /// There is no measurement.
+    /// No measurement available.
     NoUpdate,
 }
 
 impl RangeStatus {
-    /// The low five bits of the status register.
+    /// Decodes the low five bits of the status register.
     #[must_use]
     pub const fn decode(code: u8) -> Self {
         match code & 0x1F {
@@ -272,7 +287,7 @@ impl RangeStatus {
         }
     }
 
-    /// A code of the status register that [`decode`](Self::decode) takes for it.
+    /// A code of the status register that [`decode`](Self::decode) maps to this status.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -292,13 +307,14 @@ impl RangeStatus {
         }
     }
 
-    /// Has the chip measured, whatever it found?
+    /// Whether the chip has completed a measurement, with or without a target.
     #[must_use]
     pub const fn is_measurement(self) -> bool {
         !matches!(self, Self::Starting | Self::Hardware | Self::Processing | Self::NoUpdate)
     }
 
-    /// The number that ST's drivers and [`TofData::status`](stampfly_types::messages::TofData) give it.
+    /// Number of the status in ST's drivers and in
+    /// [`TofData::status`](stampfly_types::messages::TofData).
     #[must_use]
     pub const fn number(self) -> u8 {
         match self {
@@ -323,26 +339,27 @@ impl RangeStatus {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
-    /// The status register's code.
+    /// Code of the status register.
     pub code: u8,
-    /// Number of the measurement since the start; goes from 255 to 128.
+    /// Number of the measurement since the start; 255 is followed by 128.
     pub count: u8,
-    /// Detectors in use.
+    /// Number of detectors in use.
     pub detectors: f32,
-    /// Photons of the chip's own light, 10⁶/s.
+    /// Rate of photons of the laser, 10⁶/s.
     pub signal_rate: f32,
-    /// Photons of any other light, 10⁶/s.
+    /// Rate of photons of ambient light, 10⁶/s.
     pub ambient_rate: f32,
     /// Standard deviation of the distance, m.
     pub sigma: f32,
-    /// Distance, m, as the chip says it; below zero by its calibration's error.
+    /// Distance as reported by the chip, m. Negative values result from the error of its
+    /// calibration.
     pub distance: f32,
 }
 
 impl Reading {
-    /// Takes the result block apart; `None` when nobody drives the bus: every byte the same, all ones or all zeros.
+    /// Decodes the result block. `None` when no chip drives the bus: all bytes ones or all zeros.
     ///
-    /// Rates have seven bits after the point, detectors eight, the standard deviation two.
+    /// Rates have seven fractional bits, detectors eight, the standard deviation two.
     #[must_use]
     pub fn decode(block: &[u8; RESULT_BYTES]) -> Option<Self> {
         if *block == [0xFF; RESULT_BYTES] || *block == [0; RESULT_BYTES] {
@@ -361,7 +378,7 @@ impl Reading {
         })
     }
 
-    /// The code in words.
+    /// The status that corresponds to the code.
     #[must_use]
     pub const fn status(&self) -> RangeStatus {
         RangeStatus::decode(self.code)

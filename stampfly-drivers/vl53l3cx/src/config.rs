@@ -1,30 +1,31 @@
-//! What a VL53L3CX and its driver are told: reach, time, rhythm, offset. How the registers say it is in
+//! Configuration of a VL53L3CX and its driver: range, timing, offset. The register codes are in
 //! [`codec`](super::codec).
 
 use stampfly_types::Duration;
 
-/// What the chip and the driver are told.
+/// Configuration of the chip and the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
-    /// How far to look.
+    /// Range of the chip.
     pub mode: DistanceMode,
-    /// How long to measure, 33 to 500 ms. Twice the time is a third less noise.
+    /// Duration of a measurement, 33 to 500 ms. Doubling it reduces the noise by about a third.
     pub budget: Duration,
-    /// From one measurement to the next, no less than the budget.
+    /// Time between the starts of two measurements, at least the budget.
     pub period: Duration,
-    /// Added to what the chip says, m: the error of this chip behind this cover.
+    /// Correction added to the chip's distance, m: the error of this chip behind its cover.
     pub offset: f32,
-    /// Which way to measure.
+    /// Ranging mode.
     pub ranging: Ranging,
 }
 
 impl Config {
-    /// The default with [`Ranging::Automatic`]. `target`: is something in reach for sure when the driver is first used?
+    /// The default with [`Ranging::Automatic`]. Set `target` if a target is certain to be in range
+    /// when the driver is first used.
     ///
     /// ```
     /// use stampfly_vl53l3cx::{Config, Ranging};
-    /// // It looks at the floor that the vehicle stands on when it is switched on.
+    ///     // The sensor faces the floor on which the vehicle stands at power-on.
     /// let config = Config::automatic(true);
     /// assert_eq!(config, Config { ranging: Ranging::Automatic { target: true }, ..Config::default() });
     /// ```
@@ -41,33 +42,35 @@ impl Config {
 }
 
 impl Default for Config {
-    /// 4 m, 33 ms, 30 Hz, as it comes from the factory; the light mode.
+    /// 4 m, 33 ms, 30 Hz, the factory's calibration, the light mode.
     fn default() -> Self {
         Self { ranging: Ranging::Light, ..Self::automatic(false) }
     }
 }
 
-/// Which way to measure. Both give the same kind of sample.
+/// Ranging mode. All modes yield the same kind of sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Ranging {
-    /// The chip computes a distance, as a VL53L1X does: 17 bytes a measurement. Nobody is known to have seen a VL53L3CX do it.
+    /// The chip computes the distance, like a VL53L1X: 17 bytes per measurement. No public report
+    /// of a VL53L3CX in this mode is known.
     Light,
-    /// The driver computes it from a histogram of photons, as ST's driver does: 151 bytes a measurement, up to 3.2 m whatever the
-    /// [`DistanceMode`].
+    /// The driver computes the distance from a photon histogram, like ST's driver: 151 bytes per
+    /// measurement, up to 3.2 m in every [`DistanceMode`].
     Histogram,
-    /// The light mode, unless its first results cannot be right ([`Implausible`](crate::Implausible)): then the histogram's, unless that
-    /// sees nothing either. It is settled by the first 24 measurements, within 3 s of the first; after that nothing changes any more, also not at
-    /// a later start.
+    /// The light mode, unless its first results are implausible
+    /// ([`Implausible`](crate::Implausible)). The driver then changes to histograms, and back if
+    /// these find no target either. The mode is settled by the first 24 measurements, within 3 s of
+    /// the first one, and never changes afterwards, even at a later start.
     Automatic {
-        /// Is something in reach for sure when the driver is first used, such as the floor under a vehicle? Then seeing nothing is not
-        /// right either.
+        /// A target is certain to be in range when the driver is first used, such as the floor
+        /// under a vehicle. Measurements without a target are then implausible, too.
         target: bool,
     },
 }
 
-/// How far the chip looks: a longer light pulse period sees further, but not so well in sunlight.
+/// Range of the chip: longer laser periods extend the range but are more sensitive to sunlight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DistanceMode {

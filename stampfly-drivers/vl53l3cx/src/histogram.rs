@@ -1,8 +1,11 @@
-//! The chip as ST's own driver runs it: each measurement is a histogram of photons over time, whose pulse the processor finds.
+//! Histogram mode: each measurement is a histogram of photons over time, in which the processor
+//! finds the pulse.
 //!
-//! It is the second way to range ([`Ranging::Histogram`](crate::Ranging)), for a part that makes nonsense of the first. Every public program that is known to
-//! range with a VL53L3CX does it this way; none is known that does it like a VL53L1X, which [`codec`](crate::codec) describes. It costs the bus 3.7 ms a
-//! measurement instead of 0.6, and the processor what [`bins`](crate::bins) does. Not for several targets: the strongest one counts.
+//! The second ranging mode ([`Ranging::Histogram`](crate::Ranging)), for parts that yield no useful
+//! results in the first. All public programs known to use a VL53L3CX work this way; none is known
+//! that uses it like a VL53L1X, as described in [`codec`](crate::codec). A measurement takes 3.7 ms
+//! on the bus instead of 0.6 ms, and the processor time of [`bins`](crate::bins). Not for several
+//! targets: only the strongest one is evaluated.
 
 use crate::bins::{BLOCK_BYTES, Histogram};
 use crate::codec::Reading;
@@ -14,7 +17,7 @@ use stampfly_driver_core::chip::ChipError;
 use stampfly_types::Instant;
 
 impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
-    /// Sets a chip up that has just been woken. It measures when it is asked to.
+    /// Sets up a chip that has just been woken. It measures on request.
     pub(crate) async fn start_histogram(&mut self) -> Result<(), ChipError<I::Error>> {
         let oscillator = u16::from_be_bytes(self.port.read_twice(FAST_OSCILLATOR).await?);
         let factory = i16::from_be_bytes(self.port.read_twice(FACTORY_OFFSET).await?);
@@ -24,7 +27,7 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
         for (register, values) in ONCE.into_iter().chain([(TIMES, &times[..])]) {
             self.port.write(register, values).await?;
         }
-        // A wrong bit in here would not be noticed as anything but wrong distances.
+        // Read back, because a wrong bit here would only show as wrong distances.
         let kept: [u8; TIMES_BYTES] = self.port.read(TIMES).await?;
         if kept != times {
             return Err(ChipError::Configuration { status: kept[6] });
@@ -34,7 +37,7 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
         Ok(())
     }
 
-    /// Sends the settings, which takes the interrupt back and starts a measurement.
+    /// Sends the settings, which clears the interrupt and starts a measurement.
     async fn arm(&mut self) -> Result<(), ChipError<I::Error>> {
         let Some(session) = &mut self.session else { return Err(ChipError::NoSample) };
         for (register, values) in session.runs() {
@@ -46,13 +49,14 @@ impl<I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'_, I, X, T> {
         Ok(())
     }
 
-    /// A measurement, and when it was there: one that runs already, because a call for it was dropped, or one of its own.
+    /// A measurement, and the time at which it was ready. Continues a measurement that is in
+    /// progress because an earlier call was dropped, or starts one.
     pub(crate) async fn histogram(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
-        // And one more, for the first after a start is of nothing.
+        // One more than the repetitions, because the first histogram after a start is empty.
         for _ in 0..=REPETITIONS + 1 {
-            // One that nobody came for in time is too old.
+            // A measurement that was not read in time is too old.
             if self.stale || self.port.now() > self.due + self.config.period / 4 {
-                // A chip that lost its power does not answer here any more.
+                // A chip that has lost its power no longer answers at this address.
                 self.look().await?;
                 self.arm().await?;
             }

@@ -33,62 +33,73 @@ pub use trial::Implausible;
 use trial::{Trial, Verdict};
 pub use xshut::{NoXshut, Xshut};
 
-/// In reset. The data sheet gives no shortest time.
+/// Duration of a reset by the pin. The data sheet gives no minimum.
 const RESET: Duration = Duration::from_millis(1);
-/// In reset by the register: 100 µs in public drivers of the VL53L1X.
+/// Duration of a reset by the register: 100 µs as in public drivers of the VL53L1X.
 const SOFT_RESET: Duration = Duration::from_micros(100);
-/// From reset to the first access; 1.2 ms at most (§ "Power sequence").
+/// Time from a reset to the first access, at most 1.2 ms (§ "Power sequence"), with a margin.
 const BOOT: Duration = Duration::from_millis(4);
-/// How long the firmware may take to start.
+/// Time limit for the start of the firmware.
 const BOOT_LIMIT: Duration = Duration::from_millis(100);
-/// How long to wait for the neighbour that is waking up: a little longer than that may take.
+/// Time limit for another driver that wakes its chip, slightly longer than that takes.
 const NEIGHBOUR_LIMIT: Duration = Duration::from_millis(200);
-/// The chip's clock may be off by one part in this many.
+/// Reciprocal of the largest relative error of the chip's clock.
 const DRIFT: u64 = 32;
-/// After so many periods half of one may have drifted away: the rhythm is not known any more.
+/// Number of periods after which that error amounts to half a period, so that the phase is unknown.
 const IN_RHYTHM: u64 = DRIFT / 2;
-/// A result that has been seen before is taken back and waited out so often.
+/// Number of repeated results after which the driver gives up; each is cleared and the next one
+/// awaited.
 const REPETITIONS: usize = 2;
-/// How often the interrupt is looked at once it may be up.
+/// Pause between two reads of the interrupt status while a measurement is expected.
 const POLL: Duration = Duration::from_millis(2);
-/// How often the number of the measurement has to advance in the self test.
+/// Number of new measurements that the self test requires.
 const ADVANCES: usize = 2;
 
 /// The driver. Implements [`RangeFinder`].
 ///
-/// `Sample::at` is the middle of the measurement, good to the 2 ms between two looks at the chip.
+/// `Sample::at` is the middle of the measurement, accurate to the 2 ms between two reads of the
+/// chip.
 ///
-/// # Two ways
-/// [`Config::ranging`] says whether the chip computes the distance or the driver does, from a histogram. In [`Ranging::Automatic`] a call ends once with
-/// [`ChipError::Implausible`] when the driver changes over, and with [`ChipError::SelfTest`] if it changes back because neither way measures
-/// anything; the next call starts the chip again.
+/// # Ranging modes
+/// [`Config::ranging`] selects whether the chip computes the distance, or the driver from a
+/// histogram. In [`Ranging::Automatic`] one call returns [`ChipError::Implausible`] when the driver
+/// changes to histograms. If these yield no measurement either, one call returns
+/// [`ChipError::SelfTest`] and the driver changes back. After either error the next call starts the
+/// chip again.
 ///
-/// A sample is vouched for (`valid`) when the chip calls it [`RangeStatus::Valid`] and it is above zero and within the
-/// mode's reach. The first one after a start is not: the chip tells a target beyond its reach from one within by
-/// comparing measurements. `status` is [`RangeStatus::number`]; [`reading`](Self::reading) has everything it said.
+/// A sample is valid when its status is [`RangeStatus::Valid`] and its distance is positive and
+/// within the range of the mode. The first sample after a start is not valid, because wrap-around
+/// is detected by comparing measurements. `status` is [`RangeStatus::number`];
+/// [`reading`](Self::reading) returns the complete measurement.
 ///
-/// # Several on a bus
-/// Every chip wakes up at 0x29, so each has a pin on its XSHUT and is given an address of its own. Creating a driver
-/// puts its chip into reset: create all of them, with one [`BootAddress`] between them, before the first is used. From
-/// then on they start and restart in any order and in separate tasks. A chip that lost its power is back at 0x29 and
-/// no longer answers: the driver says [`ChipError::Restarted`], and its next call resets that chip, and that one only,
-/// and moves it. When both are back at 0x29 the first one to call waits in reset ([`ChipError::AddressTaken`]) until
-/// the other has moved.
+/// # Several chips on a bus
+/// Every chip starts at address 0x29, so each needs a pin on its XSHUT and an address of its own.
+/// Creating a driver resets its chip: create all drivers, with one shared [`BootAddress`], before
+/// using the first. After that they start and restart in any order and in separate tasks.
 ///
-/// XSHUT rises only when nothing is on the bus, as the chip wants it: right after a transfer of the driver's own. That holds where all who share
-/// the bus are tasks of one executor. Where they are not, give it an [`Xshut`] of your own that keeps the others off the bus meanwhile.
+/// A chip that lost its power is back at 0x29 and no longer answers at its own address. Its driver
+/// returns [`ChipError::Restarted`], and the next call resets and moves this chip without affecting
+/// others. When two chips are back at 0x29, the first driver that is called holds its chip in reset
+/// ([`ChipError::AddressTaken`]) until the other chip has been moved.
 ///
-/// A lone chip may stay: [`BOOT_ADDRESS`](Vl53l3cx::BOOT_ADDRESS) as its address.
+/// XSHUT must rise only while the bus is idle. The driver therefore raises it directly after a
+/// transfer of its own. This suffices when all users of the bus are tasks of one executor.
+/// Otherwise pass an [`Xshut`] of your own that keeps the others off the bus meanwhile.
 ///
-/// # Without a pin
-/// [`NoXshut`] instead of one. The chip is looked for at its address, where somebody may have put it, and then at 0x29; it is reset by a
-/// register and looked for again. One such chip may share a bus with others that have pins: start it before them, at an address of its own. Two
-/// without a pin may as well, if somebody else has moved them apart. A start takes 4 ms longer, for a chip that has its power since just now.
+/// A single chip may stay at [`BOOT_ADDRESS`](Vl53l3cx::BOOT_ADDRESS).
 ///
-/// # Times
-/// The first sample takes 10 ms and two measurements, 80 ms in all. `next` ends within two periods and 20 ms
-/// ([`ChipError::NoSample`]), one period later for each of up to two results that it has seen before; when it has to start the chip, within four more periods and 350 ms.
-/// From histograms the first sample takes 100 ms, and each one after it the budget and 4 to 6 ms.
+/// # Boards without XSHUT
+/// Pass [`NoXshut`] instead of a pin. The driver searches for the chip at its address, to which it
+/// may have been moved, and at 0x29, resets it by a register and searches again. One such chip may
+/// share a bus with chips that have pins: start it before them, with an address of its own. Two
+/// chips without a pin may share a bus only if other software has moved them to different
+/// addresses. A start takes 4 ms longer, because the chip may just have been powered on.
+///
+/// # Timing
+/// The first sample takes 10 ms and two measurements, 80 ms in total. `next` returns within two
+/// periods and 20 ms ([`ChipError::NoSample`]), and one period later for each of up to two repeated
+/// results. When it has to start the chip, it returns within four more periods and 350 ms. With
+/// histograms the first sample takes 100 ms, and each further one the budget and 4 to 6 ms.
 ///
 /// ```
 /// # use stampfly_driver_fakes::memory::{Chip, Clock, Pin};
@@ -100,7 +111,7 @@ const ADVANCES: usize = 2;
 /// # let clock = Clock::default();
 /// use stampfly_vl53l3cx::{BootAddress, Config, RangeFinder, Vl53l3cx, blocking::block_on};
 ///
-/// // Two handles of one bus; on every chip's XSHUT a pin.
+/// // Two handles of one bus, and a pin on the XSHUT of each chip.
 /// let boot = BootAddress::new();
 /// let mut below = Vl53l3cx::new(below_bus, below_pin, &boot, 0x30, clock.clone(), Config::default());
 /// let mut ahead = Vl53l3cx::new(ahead_bus, ahead_pin, &boot, 0x31, clock, Config::default());
@@ -118,33 +129,35 @@ pub struct Vl53l3cx<'b, I, X, T> {
     address: u8,
     config: Config,
     ranging: bool,
-    /// The interrupt was up and has not been taken back for sure: what it stands for is old.
+    /// The interrupt may belong to an old measurement: it was set for some time, or clearing it was
+    /// interrupted.
     stale: bool,
     /// No measurement since the start.
     first: bool,
-    /// When the next measurement may be there.
+    /// Earliest time of the next measurement.
     due: Instant,
-    /// The newest result since the start, as it came.
+    /// The newest result since the start, as read.
     block: Option<[u8; RESULT_BYTES]>,
     reading: Option<Reading>,
-    /// The histogram's rhythm, where that is measured since the start.
+    /// State of the histogram mode since the start.
     session: Option<Session>,
-    /// Whether a histogram is to be measured.
+    /// Whether histogram mode is selected.
     histogram: bool,
-    /// As long as it is not settled which way to measure.
+    /// Evaluation of the first results; `None` once the ranging mode is settled.
     trial: Option<Trial>,
     doubt: Option<Implausible>,
 }
 
 impl Vl53l3cx<'_, (), (), ()> {
-    /// The address after every start.
+    /// Address of every chip after a start.
     pub const BOOT_ADDRESS: u8 = codec::BOOT_ADDRESS;
 }
 
 impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
-    /// A driver of the chip on this pin, which it puts into reset, to be moved to this address; without a pin [`NoXshut`].
+    /// A driver that will move its chip to this address. Resets the chip with its pin; without a
+    /// pin pass [`NoXshut`].
     pub fn new(bus: I, mut xshut: X, boot: &'b BootAddress, address: u8, clock: T, config: Config) -> Self {
-        // A pin that refuses is reported by the first start.
+        // The first start reports a pin that refuses.
         let _ = xshut.hold();
         let port = Port::new(I2cRegisters::new(bus, address), clock, TransferLimit::I2C);
         Self {
@@ -171,34 +184,38 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
 
     stampfly_driver_core::transfer_limit!();
 
-    /// Takes the driver apart: the bus, the pin and the clock. The chip goes on measuring at its address.
+    /// Takes the driver apart and returns the bus, the pin and the clock. The chip continues to
+    /// measure at its address.
     pub fn release(self) -> (I, X, T) {
         let (bus, clock) = self.port.release();
         (bus, self.xshut, clock)
     }
 
-    /// The newest measurement, all of it; `None` before the first.
+    /// The newest measurement with all its values; `None` before the first.
     #[must_use]
     pub const fn reading(&self) -> Option<Reading> {
         self.reading
     }
 
-    /// Which way it measures: [`Ranging::Light`] or [`Ranging::Histogram`].
+    /// The present ranging mode: [`Ranging::Light`] or [`Ranging::Histogram`].
     #[must_use]
     pub const fn ranging(&self) -> Ranging {
         if self.histogram { Ranging::Histogram } else { Ranging::Light }
     }
 
-    /// Why the light mode's results could not be right, in [`Ranging::Automatic`]; `None` as long as they could.
+    /// Why [`Ranging::Automatic`] left the light mode; `None` if it did not.
     #[must_use]
     pub const fn doubt(&self) -> Option<Implausible> {
         self.doubt
     }
 
-    /// Sets the chip up: reset, identification, address, configuration, a first measurement that is thrown away.
+    /// Sets the chip up: reset, identification, address, configuration, a first measurement that is
+    /// discarded.
     ///
     /// # Errors
-    /// Another chip, an impossible configuration, the boot address in use, the bus.
+    /// [`ChipError::Identification`], [`ChipError::InvalidConfiguration`],
+    /// [`ChipError::AddressTaken`], [`ChipError::Configuration`] when the firmware does not start
+    /// or a setting is not kept, and errors of the bus.
     pub async fn start(&mut self) -> Result<(), ChipError<I::Error>> {
         self.ranging = false;
         if !codec::is_possible(&self.config) {
@@ -215,7 +232,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             return Ok(());
         }
         self.configure().await?;
-        // The first measurement finds the detector's bias; those after it only follow its drift.
+        // The first measurement searches the detector's bias; the following ones only track its
+        // drift.
         self.port.write(register::SYSTEM_MODE_START, &[codec::RANGING]).await?;
         self.due = self.port.now() + self.config.budget;
         self.ready().await?;
@@ -229,21 +247,24 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// Resets and sets the chip up, has it keep its times and limits and measure three times. 0.15 s by default; within 21 periods
-    /// and one second, however slow the bus, with [`TransferLimit::I2C_SENSORS`].
+    /// Sets the chip up, checks that it keeps its times and limits, and measures three times.
+    /// 0.15 s by default; at most 21 periods and one second on a slow bus with
+    /// [`TransferLimit::I2C_SENSORS`].
     ///
-    /// The chip's own tests of laser and detector come with every measurement: this one asks whether they passed and whether
-    /// measurements go on. No target is a pass, so a laser that the chip believes in but somebody covered is not found.
-    /// Afterwards the chip measures, and the next sample is the next measurement. Neighbours notice nothing.
+    /// The chip tests laser and detector in every measurement: this test checks that they pass and
+    /// that measurements continue. It passes without a target, so it does not detect a covered
+    /// window. The chip measures afterwards, and the next sample is the next measurement. Other
+    /// chips on the bus are not affected.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start), among them [`ChipError::Configuration`] for firmware that does not start and
-    /// times that are not kept; [`ChipError::NoSample`] when measurements end or are not numbered on;
-    /// [`ChipError::Data`] when nobody drives the bus; [`ChipError::SelfTest`] when the chip says that its laser or
-    /// detector failed, that it could not compute, or something that is no status.
+    /// Those of [`start`](Self::start), including [`ChipError::Configuration`] when the firmware
+    /// does not start or does not keep its times; [`ChipError::NoSample`] when measurements stop or
+    /// their number does not advance; [`ChipError::Data`] when no chip drives the bus;
+    /// [`ChipError::SelfTest`] when the chip reports a fault of laser or detector, a failed
+    /// computation or an unknown status.
     pub async fn self_test(&mut self) -> Result<(), ChipError<I::Error>> {
         self.start().await?;
-        // The first one after a start is not a measurement of anything: only its number counts.
+        // The first result after a start is empty; only its number is used.
         let mut before = self.measurement().await?.1.count;
         self.first = false;
         for _ in 0..ADVANCES {
@@ -259,7 +280,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// The next result, taken apart, and when it was there.
+    /// The next result, decoded, and the time at which it was ready.
     async fn measurement(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
         if self.histogram {
             return self.histogram().await;
@@ -268,7 +289,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok((seen, Reading::decode(&block).ok_or(ChipError::Data)?))
     }
 
-    /// Starts if it has to, and takes the next measurement.
+    /// Starts the chip if necessary and returns the next measurement.
     async fn started_measurement(&mut self) -> Result<(Instant, Reading), ChipError<I::Error>> {
         if !self.ranging {
             self.start().await?;
@@ -276,18 +297,18 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.measurement().await
     }
 
-    /// Takes note of a result as long as it is not settled which way to measure, and settles it.
+    /// Evaluates a result while the ranging mode is not settled, and settles it.
     fn try_out(
         &mut self,
         outcome: &Result<(Instant, Reading), ChipError<I::Error>>,
     ) -> Result<(), ChipError<I::Error>> {
         let now = self.port.now();
         let result = match outcome {
-            // Not a measurement of anything.
+            // The first result after a start is empty.
             Ok(_) if self.first => return Ok(()),
             Ok((_, reading)) => Some(*reading),
             Err(ChipError::NoSample) => None,
-            // Whatever this is, the other way would not mend it.
+            // The other mode would not cure any other error.
             Err(_) => return Ok(()),
         };
         let Some(verdict) = self.trial.as_mut().and_then(|trial| trial.note(now, result)) else { return Ok(()) };
@@ -300,15 +321,15 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             self.trial = Some(Trial::new(true));
             Err(ChipError::Implausible)
         } else {
-            // Where it sees nothing either there is no reason to prefer it.
+            // Histograms find no target either, so there is no reason to prefer them.
             Err(ChipError::SelfTest)
         }
     }
 
-    /// From whatever state to the firmware running at the chip's own address.
+    /// Starts the chip from any state and moves it to its own address.
     async fn wake(&mut self) -> Result<(), ChipError<I::Error>> {
         let Self { port, xshut, boot, address, .. } = self;
-        // Before anything else: a chip that came back by itself must not stand in its neighbour's way.
+        // First of all: a chip that has restarted by itself must not block the boot address.
         xshut.hold().map_err(|_| ChipError::Pin)?;
         let deadline = port.now() + NEIGHBOUR_LIMIT;
         while boot.is_taken() {
@@ -319,7 +340,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             port.check_clock()?;
         }
         let mut waking = boot.take(xshut).ok_or(ChipError::AddressTaken)?;
-        // Where the chip may be when it has started.
+        // Addresses at which the chip may answer after its start.
         let mut places = [codec::BOOT_ADDRESS; 2];
         if X::WIRED {
             port.move_to(codec::BOOT_ADDRESS);
@@ -327,11 +348,12 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             if answers(port).await? {
                 return Err(ChipError::AddressTaken);
             }
-            // Not while anything is on the bus (DS13204, "Power sequence"). A transfer of ours has just ended, and before this task waits
-            // again nobody else of its executor begins one: so nothing may come in between.
+            // XSHUT must not rise during a transfer (DS13204, "Power sequence"). The driver's own
+            // transfer has just ended, and no other task of the executor runs before the next
+            // await. Nothing may come between the two.
             waking.release().map_err(|_| ChipError::Pin)?;
         } else {
-            // It may have its power since just now.
+            // The chip may just have been powered on.
             port.wait(BOOT).await;
             reset_by_register(port, *address).await?;
             places = [*address, codec::BOOT_ADDRESS];
@@ -364,7 +386,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(())
     }
 
-    /// The furthest distance that is vouched for, m.
+    /// Largest valid distance, m.
     const fn reach(&self) -> f32 {
         if self.histogram { bins::REACH } else { self.config.mode.reach() }
     }
@@ -383,7 +405,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.port.write(register::PHASECAL_CONFIG_TIMEOUT_MACROP, &[codec::phase_calibration(mode)]).await?;
         let ranging = codec::ranging(&self.config);
         self.port.write(register::RANGE_CONFIG_TIMEOUT_MACROP_A, &ranging).await?;
-        // A wrong bit in here would not be noticed as anything but wrong distances.
+        // Read back, because a wrong bit here would only show as wrong distances.
         let kept: [u8; 12] = self.port.read(register::RANGE_CONFIG_TIMEOUT_MACROP_A).await?;
         if kept != ranging {
             return Err(ChipError::Configuration { status: kept[2] });
@@ -394,7 +416,8 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         self.port.write(register::SYSTEM_INTERMEASUREMENT_PERIOD, &period).await
     }
 
-    /// Reads where a chip that runs has to answer: when it refuses twice, it is not there any more.
+    /// Reads from a running chip. Two missing acknowledges mean that it no longer answers at its
+    /// address.
     async fn read<const N: usize>(&mut self, register: u16) -> Result<[u8; N], ChipError<I::Error>> {
         let absent = |error: &I::Error| matches!(error.kind(), ErrorKind::NoAcknowledge(_));
         match self.port.read(register).await {
@@ -410,16 +433,16 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         }
     }
 
-    /// Waits for a result that has not been there before, and takes its interrupt back.
+    /// Waits for a new result and clears its interrupt.
     async fn result(&mut self) -> Result<(Instant, [u8; RESULT_BYTES]), ChipError<I::Error>> {
         for _ in 0..=REPETITIONS {
             let seen = self.ready().await?;
-            // Until the interrupt has been taken back, what follows may be this measurement again.
+            // Until the interrupt is cleared, the next one may belong to this measurement again.
             self.stale = true;
             let block: [u8; RESULT_BYTES] = self.read(register::RESULT_RANGE_STATUS).await?;
             self.port.write(register::SYSTEM_INTERRUPT_CLEAR, &[codec::CLEAR]).await?;
             self.stale = false;
-            // The chip numbers its results: the same one again means that it did not understand the last clear.
+            // Results are numbered: an identical one means that the chip missed the last clear.
             if self.block.replace(block) != Some(block) {
                 return Ok((seen, block));
             }
@@ -428,11 +451,11 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Err(ChipError::NoSample)
     }
 
-    /// Is the interrupt up? Notices a chip that came back with other settings.
+    /// Reads the interrupt status. Detects a chip that restarted by its other settings.
     async fn look(&mut self) -> Result<bool, ChipError<I::Error>> {
         let [mut control, mut status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
         if control != codec::ACTIVE_HIGH {
-            // Twice, before a wrong bit on the bus costs a start.
+            // Two reads, so that one wrong bit on the bus does not cause a new set-up.
             [control, status] = self.read(register::GPIO_HV_MUX_CTRL).await?;
         }
         if control != codec::ACTIVE_HIGH {
@@ -442,13 +465,13 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
         Ok(status & 1 != 0)
     }
 
-    /// Waits for a new measurement, and gives the instant it was there.
+    /// Waits for a new measurement and returns the time at which it was ready.
     async fn ready(&mut self) -> Result<Instant, ChipError<I::Error>> {
         let period = self.config.period;
         let asked = self.port.now();
         let deadline = asked.max(self.due) + period + period;
-        // An interrupt that may have been up for long tells nothing about when: take it back and wait for the next.
-        // A histogram is only measured when it is asked for.
+        // An interrupt that may have been set for some time does not show when: clear it and wait
+        // for the next. Not with histograms, which are measured only on request.
         self.stale |= !self.histogram && asked > self.due + period / 4;
         self.port.wait_until(self.due).await;
         let mut before = None;
@@ -457,11 +480,13 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             let up = self.look().await?;
             let now = self.port.now();
             if up && !self.stale {
-                // Between two looks; or, up at the first look, when the rhythm says, for all that is known.
+                // Between the last two reads; if it was set at the first read, at the time
+                // predicted by the period.
                 let seen = match before {
                     Some(before) => before + now.since(before) / 2,
                     None => now.min(self.due + (period - early(period))),
                 };
+                // Wakes up before the measurement is expected, to see the interrupt rise.
                 self.due = seen + early(period);
                 return Ok(seen);
             }
@@ -470,7 +495,7 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
             }
             self.stale = false;
             if up {
-                // The next one comes in the rhythm: nothing to look at, and no bus to take, before.
+                // The next measurement follows with the period: no need to occupy the bus before.
                 let late = now.since(self.due + (period - early(period))).as_micros();
                 let missed = if late == 0 { 0 } else { late.checked_div(period.as_micros()).unwrap_or(0) + 1 };
                 if (1..=IN_RHYTHM).contains(&missed) {
@@ -489,14 +514,14 @@ impl<'b, I: I2c, X: Xshut, T: Timebase> Vl53l3cx<'b, I, X, T> {
     }
 }
 
-/// Model and module type of whoever answers at the port's address.
+/// Reads model and module type at the port's address.
 async fn identification<I: I2c, T: Timebase>(
     port: &mut Port<I2cRegisters<I>, T>,
 ) -> Result<[u8; 2], ChipError<I::Error>> {
     port.read(register::IDENTIFICATION_MODEL_ID).await
 }
 
-/// Is somebody at the port's address?
+/// Whether a chip answers at the port's address.
 async fn answers<I: I2c, T: Timebase>(port: &mut Port<I2cRegisters<I>, T>) -> Result<bool, ChipError<I::Error>> {
     match identification(port).await {
         Err(ChipError::BusTimeout) => Err(ChipError::BusTimeout),
@@ -504,8 +529,8 @@ async fn answers<I: I2c, T: Timebase>(port: &mut Port<I2cRegisters<I>, T>) -> Re
     }
 }
 
-/// Resets the chip that is at this address or has not been moved yet. What it says of itself is asked afterwards: one that a dropped
-/// start left standing still says nothing.
+/// Resets the chip at this address, or at the boot address if it has not been moved. Does not check
+/// its identification, because a chip that a dropped start left in reset does not return one.
 async fn reset_by_register<I: I2c, T: Timebase>(
     port: &mut Port<I2cRegisters<I>, T>,
     address: u8,
@@ -515,7 +540,7 @@ async fn reset_by_register<I: I2c, T: Timebase>(
         let taken = answers(port).await?;
         port.move_to(address);
         match answers(port).await? {
-            // Once reset, both would be there.
+            // After the reset both would be at the boot address.
             true if taken => return Err(ChipError::AddressTaken),
             true => {}
             false => port.move_to(codec::BOOT_ADDRESS),
@@ -523,7 +548,7 @@ async fn reset_by_register<I: I2c, T: Timebase>(
     }
     port.write(register::SOFT_RESET, &[codec::HOLD]).await?;
     port.wait(SOFT_RESET).await;
-    // No document says which of its addresses it has now.
+    // The address of the chip in this state is not documented.
     match port.write(register::SOFT_RESET, &[codec::LET_GO]).await {
         Err(ChipError::Bus(_)) if address != codec::BOOT_ADDRESS => {
             port.move_to(codec::BOOT_ADDRESS);
@@ -533,7 +558,7 @@ async fn reset_by_register<I: I2c, T: Timebase>(
     }
 }
 
-/// A little early: the chip's clock may be fast by some per cent.
+/// Slightly less than `span`, because the chip's clock may be fast by some per cent.
 fn early(span: Duration) -> Duration {
     span - span / 8
 }
@@ -550,7 +575,7 @@ impl<I: I2c, X: Xshut, T: Timebase> RangeFinder for Vl53l3cx<'_, I, X, T> {
         self.reading = Some(reading);
         let checked = !core::mem::replace(&mut self.first, false);
         let distance = reading.distance + self.config.offset;
-        // Zero is what the chip says when it knows nothing, not a distance.
+        // The chip reports a distance of zero when it has none.
         let plausible = reading.distance > 0.0 && distance > 0.0 && distance <= self.reach();
         let data = TofData {
             distance: distance.max(0.0),

@@ -1,51 +1,58 @@
-//! What the chip is told to make histograms, as ST's core tells it: patch, fixed settings, settings of each measurement.
+//! Settings of the histogram mode, as in ST's core: patch, fixed settings, settings of each
+//! measurement.
 //!
-//! Data and arithmetic without a bus; `histogram.rs` sends them. Not for the light mode, whose registers are in
-//! [`codec`].
+//! Data and arithmetic without a bus; `histogram.rs` sends them. Not for the light mode, whose
+//! registers are in [`codec`].
 //!
-//! **Unverified** on a chip. Addresses, values and their order are those that ST's core writes (VL53LX bare driver, BSD-3-Clause:
-//! `vl53lx_register_map.h`, `VL53LX_load_patch`, `VL53LX_init_and_start_range` and `VL53LX_clear_interrupt_and_enable_next_range` in
-//! `vl53lx_api_core.c`, `VL53LX_preset_mode_histogram_long_range` in `vl53lx_api_preset_modes.c`), seen by running that core over registers
-//! that only store.
+//! **Unverified** on a chip. Addresses, values and order are those that ST's core writes (VL53LX
+//! bare driver, BSD-3-Clause: `vl53lx_register_map.h`, `VL53LX_load_patch`,
+//! `VL53LX_init_and_start_range` and `VL53LX_clear_interrupt_and_enable_next_range` in
+//! `vl53lx_api_core.c`, `VL53LX_preset_mode_histogram_long_range` in `vl53lx_api_preset_modes.c`),
+//! obtained by running that core on registers that only store.
 
 use crate::bins::{Exposure, Histogram, Part};
 use crate::codec::{self, RangeStatus, Reading};
 
-/// The fast oscillator as the factory measured it, 2 bytes: MHz with 12 bits after the point.
+/// Frequency of the fast oscillator as measured by the factory, 2 bytes: MHz with 12 fractional
+/// bits.
 pub(crate) const FAST_OSCILLATOR: u16 = 0x0006;
-/// What the factory found to be missing from every distance, as it is there after a start: quarters of a millimetre, 13 bits with a sign in 2
-/// bytes. ST's core takes it from here, not from [`codec::register::MM_CONFIG_OUTER_OFFSET_MM`] (`VL53LX_get_customer_nvm_managed`).
+/// The factory's correction of every distance, as found after a start: quarters of a millimetre, 13
+/// signed bits in 2 bytes. ST's core reads it from here and not from
+/// [`codec::register::MM_CONFIG_OUTER_OFFSET_MM`] (`VL53LX_get_customer_nvm_managed`).
 pub(crate) const FACTORY_OFFSET: u16 = codec::register::ALGO_PART_TO_PART_RANGE_OFFSET_MM;
-/// A histogram begins here.
+/// First register of a histogram.
 pub(crate) const BLOCK: u16 = 0x0088;
-/// Times and periods of both parts.
+/// Times and laser periods of both parts.
 pub(crate) const TIMES: u16 = 0x005A;
 pub(crate) const TIMES_BYTES: usize = 10;
-/// Oscillators that there can be: a third from the nominal 11.8 MHz.
+/// Plausible oscillator frequencies: the nominal 11.8 MHz within a third.
 const OSCILLATORS: core::ops::RangeInclusive<u16> = 32_000..=64_000;
-/// Where the laser starts in its period while the chip finds its own reference pulse, bins.
+/// Start of the laser pulse within its period during the reference measurement, bins.
 const LASER_START: u8 = 9;
-/// What of a measurement is neither of its six parts, µs, and how many parts (`VL53LX_SetMeasurementTimingBudgetMicroSeconds`).
+/// Time of a measurement outside its six parts, µs, and the number of these parts
+/// (`VL53LX_SetMeasurementTimingBudgetMicroSeconds`).
 const OVERHEAD: u32 = 1_700;
 const PARTS: u32 = 6;
-/// Time of the phase calibration, 9 ms as ST's core rounds them, and of the mode's corrections, µs.
+/// Duration of the phase calibration, 9 ms as ST's core rounds them, and of the mode corrections,
+/// µs.
 const PHASE_CALIBRATION: u32 = 9_030;
 const CORRECTIONS: u32 = 2_000;
-/// Codes of the laser's periods: 20 and 24 bins.
+/// Codes of the laser periods: 20 and 24 bins.
 const PERIODS: [u8; 2] = [0x09, 0x0B];
-/// Where the settings begin, and bytes in one write.
+/// First register of the settings, and bytes per write.
 const SETTINGS_FROM: u16 = 0x0044;
 const RUN: usize = 32;
-/// Where in the settings the phase calibration's time is, and the times of both parts.
+/// Indices in the settings of the phase calibration time and of the times of both parts.
 const CALIBRATION: usize = 0x4B - 0x44;
 const TIMES_AT: usize = 0x5A - 0x44;
-/// Where in the settings the number of their group is, and its bit.
+/// Indices in the settings of the group number, and its bit.
 const GROUP: [usize; 3] = [0x71 - 0x44, 0x7C - 0x44, 0x82 - 0x44];
 const GROUP_ID: u8 = 2;
 
-/// Sent once, before anything else. The patch first: it stops the firmware, diverts it in three places, and lets it go again. What for is not
-/// published; the one number of it that ST has a name for is the power of the phase calibration. These are settings, twenty bytes of them;
-/// there is no program among them. Then what does not change from one measurement to the next.
+/// Sent once, before everything else. First the patch, which stops the firmware, diverts it in
+/// three places and restarts it. Its purpose is not published; the only value in it that ST names
+/// is the power of the phase calibration. It consists of twenty bytes of settings and contains no
+/// program. The settings that are the same for all measurements follow.
 pub(crate) const ONCE: [(u16, &[u8]); 9] = [
     (0x0085, &[0x00]),
     (0x0083, &[0x01]),
@@ -58,18 +65,22 @@ pub(crate) const ONCE: [(u16, &[u8]); 9] = [
     (0x0024, &STATIC),
 ];
 
-/// 40 Mcps wanted from the detectors chosen; pads and interrupt as in [`codec::FIXED`]; which bins are counted in bright and in middling light:
-/// of the first part ambient light (7) and the groups 0 to 4, of the second 0 to 5.
+/// 40 Mcps as target rate for the detector selection; pads and interrupt as in [`codec::FIXED`];
+/// the bins that are counted in bright and in medium light: ambient light (7) and the groups 0 to 4
+/// in the first part, 0 to 5 in the second.
 const STATIC: [u8; 32] = [
     0x14, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x01, 0x01, 0x01, 0x02, 0x00, 0x02, 0x08, 0x00, 0x07,
     0x21, 0x43, 0x10, 0x32, 0x54, 0x07, 0x21, 0x43, 0x10, 0x02, 0x43, 0x05, 0x00,
 ];
 
-/// Sent before each measurement, from 0x0044 to the start at 0x0087. Times are those of 33 ms and 11.8 MHz.
+/// Sent before each measurement, from 0x0044 to the start at 0x0087. The times are for 33 ms and
+/// 11.8 MHz.
 ///
-/// From 0x0044: interrupt at a new sample, laser start and width, phase calibration, detectors chosen by the chip. From 0x005A: times and periods
-/// of both parts, bins in low light, no pause. From 0x0071: a group of settings, held: ambient limits, seed, windows, phases, field of view,
-/// steps of a measurement. From 0x0083: power on, no division of the count, firmware on, interrupt taken back, histograms one after the other.
+/// From 0x0044: interrupt on a new sample, laser start and width, phase calibration, detector
+/// selection by the chip. From 0x005A: times and laser periods of both parts, bins in low light, no
+/// pause. From 0x0071: a group of settings, held: ambient limits, seed, windows, phases, field of
+/// view, steps of a measurement. From 0x0083: power on, no division of the count, firmware on,
+/// interrupt cleared, histograms back to back.
 const SETTINGS: [u8; 68] = [
     0x00, 0x00, 0x20, 0x09, 0x00, 0x00, 0x02, 0x94, 0x21, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x8C, 0x00, 0x00,
     0x38, 0xFF, 0x01, 0x00, 0x20, 0x00, 0x1A, 0x00, 0x54, 0x09, 0x00, 0x46, 0x0B, 0x07, 0x21, 0x43, 0x10, 0x32, 0x54,
@@ -77,14 +88,14 @@ const SETTINGS: [u8; 68] = [
     0x00, 0x02, 0xC7, 0xFF, 0x9B, 0x02, 0x01, 0x00, 0x01, 0x01, 0x26,
 ];
 
-/// How many macro periods of this many bins are so many µs.
+/// Number of macro periods in `micros`, with a laser period of `bins`.
 const fn macro_periods(micros: u32, bins: u32, oscillator: u16) -> u32 {
     // 2304 laser periods; a bin is 64 of the oscillator's 4096ths.
     let period = 147_456 * bins as u64;
     (micros as u64 * oscillator as u64 + period / 2).saturating_div(period) as u32
 }
 
-/// The settings of so many µs and an oscillator that is so fast, and the macro periods of each part.
+/// Settings for this time budget, µs, and this oscillator, with the macro periods of each part.
 #[inline(never)]
 fn settings(budget: u32, oscillator: u16) -> ([u8; 68], [u16; 2]) {
     let bins = [Part::First, Part::Second].map(|part| part.period() as u32);
@@ -101,25 +112,27 @@ fn settings(budget: u32, oscillator: u16) -> ([u8; 68], [u16; 2]) {
     if let Some(calibration) = settings.get_mut(CALIBRATION) {
         *calibration = macro_periods(PHASE_CALIBRATION, bins[0], oscillator).min(0xFF) as u8;
     }
-    // As the chip takes them apart again.
+    // As the chip decodes them, which includes the rounding of the encoding.
     (settings, ranging.map(|code| ((code & 0xFF) << (code >> 8)) + 1))
 }
 
-/// Histograms since a start: what the next one is told, and what of the last ones has to be known.
+/// State of the histogram mode since a start: the next settings, and results of the last
+/// measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Session {
     exposure: Exposure,
     settings: [u8; 68],
-    /// What the factory found to be missing, m.
+    /// The factory's correction, m.
     offset: f32,
-    /// How many bins the light travelled last time.
+    /// Time of flight of the last measurement, bins.
     before: Option<f32>,
-    /// The number of the last measurement.
+    /// Number of the last measurement.
     count: Option<u8>,
 }
 
 impl Session {
-    /// For measurements of so many µs by a chip whose registers [`FAST_OSCILLATOR`] and [`FACTORY_OFFSET`] say this; `None` when the former cannot be.
+    /// For measurements of `budget` µs by a chip with these values of [`FAST_OSCILLATOR`] and
+    /// [`FACTORY_OFFSET`]. `None` when the oscillator frequency is implausible.
     pub(crate) fn new(budget: u32, oscillator: u16, factory: i16) -> Option<Self> {
         let (settings, macro_periods) = settings(budget, oscillator);
         OSCILLATORS.contains(&oscillator).then_some(Self {
@@ -131,17 +144,17 @@ impl Session {
         })
     }
 
-    /// [`TIMES`] as they will be sent.
+    /// The values of [`TIMES`] that will be sent.
     pub(crate) fn times(&self) -> [u8; TIMES_BYTES] {
         core::array::from_fn(|index| self.settings.get(TIMES_AT + index).copied().unwrap_or(0))
     }
 
-    /// What takes the interrupt back and starts a measurement, in runs of registers.
+    /// The settings that clear the interrupt and start a measurement, in runs of registers.
     pub(crate) fn runs(&self) -> impl Iterator<Item = (u16, &[u8])> {
         (SETTINGS_FROM..).step_by(RUN).zip(self.settings.chunks(RUN))
     }
 
-    /// They have been sent. A group of settings has one of two numbers, in turn.
+    /// Prepares the next settings after these have been sent: groups have two alternating numbers.
     pub(crate) fn sent(&mut self) {
         for place in GROUP {
             if let Some(hold) = self.settings.get_mut(place) {
@@ -150,7 +163,8 @@ impl Session {
         }
     }
 
-    /// What a histogram says; `None` for the first after a start, which is of nothing, and for one that has been taken before.
+    /// Evaluates a histogram. `None` for the first one after a start, which is empty, and for one
+    /// that has been evaluated before.
     pub(crate) fn take(&mut self, histogram: &Histogram) -> Option<Reading> {
         let nothing = RangeStatus::decode(histogram.code) == RangeStatus::Starting;
         if nothing || self.count.replace(histogram.count) == Some(histogram.count) {
@@ -169,8 +183,8 @@ mod tests {
     #[test]
     fn the_settings_are_those_that_st_writes_for_33_ms() {
         let (settings, macro_periods) = settings(33_000, 48_332);
-        // `VL53LX_init_and_start_range` of ST's core, long range, 33 ms, on a chip whose register 0x0006 says 0xBCCC, but for the pause
-        // between measurements, which there is none of.
+        // `VL53LX_init_and_start_range` of ST's core, long range, 33 ms, on a chip whose register
+        // 0x0006 is 0xBCCC, except for the pause between measurements, which is zero here.
         let of_st = [
             0x00, 0x00, 0x20, 0x09, 0x00, 0x00, 0x02, 0x94, 0x21, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x8C, 0x00,
             0x00, 0x38, 0xFF, 0x01, 0x00, 0x20, 0x00, 0x1A, 0x00, 0x54, 0x09, 0x00, 0x46, 0x0B, 0x07, 0x21, 0x43, 0x10,

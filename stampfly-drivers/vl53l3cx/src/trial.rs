@@ -1,41 +1,44 @@
-//! Are the light mode's first results what a range finder says, or nonsense? Pure counting; the driver acts on it in
-//! [`Ranging::Automatic`](crate::Ranging).
+//! Plausibility of the light mode's first results.
 //!
-//! It is asked about the first measurements after power-on and never later: a vehicle stands then, and a change of how its height is measured
-//! must not happen in flight.
+//! Only counts; the driver acts on the verdict in [`Ranging::Automatic`](crate::Ranging). It covers
+//! the first measurements after power-on, while the vehicle stands, because the source of the
+//! height must not change in flight.
 
 use crate::codec::{RangeStatus, Reading};
 use stampfly_types::{Duration, Instant};
 
-/// So many measurements are enough: 0.4 s.
+/// Number of results after which the verdict is reached: 0.4 s.
 const ENOUGH: u8 = 12;
-/// So many valid ones that are not all the same are enough to believe it.
+/// Number of valid results, not all equal, after which the light mode counts as plausible.
 const CONVINCING: u8 = 3;
-/// So many times no measurement in time is enough to disbelieve it.
+/// Number of consecutive measurements that did not arrive in time, after which it counts as
+/// implausible.
 const SILENCES: u8 = 3;
-/// Light that is a target's, 10⁶ photons a second: what the chip itself takes for one, [`codec::ranging`](crate::codec::ranging).
+/// Signal rate of a target, 10⁶ photons a second: the chip's own limit, see
+/// [`codec::ranging`](crate::codec::ranging).
 const OF_A_TARGET: f32 = 1.0;
-/// After this nothing changes any more, whatever was or was not measured.
+/// Time after which the light mode is kept, whatever the results.
 const LIMIT: Duration = Duration::from_secs(3);
 
-/// Why the light mode's results cannot be right.
+/// Reason why the results of the light mode are implausible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Implausible {
-    /// Measurements do not come: three times in a row none was there within two periods.
+    /// Measurements do not arrive: three times in a row none was ready within two periods.
     Silent,
-    /// None of twelve was a measurement: a laser or bias test failed, or nothing could be computed.
+    /// None of twelve results was a measurement: a laser or bias test failed, or the chip could not
+    /// compute a distance.
     Failing,
-    /// As much light as of a target came back in half of them, and no distance was valid.
+    /// Half of the results had the signal rate of a target, and none was valid.
     Unseen,
-    /// Valid distances that are the same to the last bit, with their noise and light.
+    /// All valid distances were identical to the last bit, including their noise and signal rates.
     Frozen,
-    /// Nothing was seen, though [something is in reach](crate::Ranging::Automatic).
+    /// No target was found, although [one is in range](crate::Ranging::Automatic).
     Blind,
 }
 
-/// What came of it.
+/// Verdict of the evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
     Plausible,
@@ -44,16 +47,16 @@ pub(crate) enum Verdict {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
-    /// Is something in reach for sure?
+    /// A target is certain to be in range.
     target: bool,
-    /// When it is over; from the first call on.
+    /// End of the evaluation, set by the first call.
     until: Option<Instant>,
     results: u8,
     measurements: u8,
     valid: u8,
     bright: u8,
     silences: u8,
-    /// The first valid one, and whether another was different.
+    /// The first valid result, and whether another one differed from it.
     first: Option<Reading>,
     varied: bool,
 }
@@ -73,10 +76,11 @@ impl Trial {
         }
     }
 
-    /// Takes note of a result, `None` for none in time. A verdict when there is one.
+    /// Adds a result, `None` for a time-out. Returns the verdict once it is reached.
     #[inline(never)]
     pub(crate) fn note(&mut self, now: Instant, result: Option<Reading>) -> Option<Verdict> {
         let until = *self.until.get_or_insert(now + LIMIT);
+        // Too few results in time, which is no evidence against the light mode.
         if now > until {
             return Some(Verdict::Plausible);
         }
@@ -91,7 +95,7 @@ impl Trial {
         if reading.status() == RangeStatus::Valid {
             self.valid += 1;
             let first = *self.first.get_or_insert(reading);
-            // But for its number.
+            // All values except the number of the measurement.
             self.varied |= Reading { count: first.count, ..reading } != first;
         }
         if self.valid >= CONVINCING && self.varied {
@@ -128,7 +132,7 @@ mod tests {
         distance: 0.5,
     };
 
-    /// The verdict on these results, one every 33 ms, and after how many.
+    /// The verdict on these results, one every 33 ms, and their number.
     fn tried(target: bool, result: impl Fn(u8) -> Option<Reading>) -> Option<(u8, Verdict)> {
         let mut trial = Trial::new(target);
         (1..=40).find_map(|number| {

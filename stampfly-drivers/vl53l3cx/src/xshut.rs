@@ -1,16 +1,16 @@
-//! The line that keeps a chip in reset, or that there is none.
+//! The reset line of a chip, which is optional.
 //!
-//! A pin is the surer way: it stops a chip that understands nothing any more, and several chips on a bus need one each but for one of
-//! them. Without a pin a register has to do.
+//! Prefer a pin: it also resets a chip that no longer responds on the bus, and with several chips
+//! on a bus all but one need it. Without a pin the driver resets the chip by a register.
 
 use core::convert::Infallible;
 use embedded_hal::digital::OutputPin;
 
-/// What a driver does with its chip's XSHUT. Any [`OutputPin`] is one, low holding the chip; so is [`NoXshut`].
+/// The XSHUT line of a chip. Implemented by every [`OutputPin`], low for reset, and by [`NoXshut`].
 pub trait Xshut {
-    /// Why it could not be set.
+    /// Error of the line.
     type Error;
-    /// Is the line wired? A driver without it resets its chip by a register.
+    /// Whether the line is connected. If not, the driver resets the chip by a register.
     const WIRED: bool;
 
     /// Holds the chip in reset.
@@ -19,7 +19,7 @@ pub trait Xshut {
     /// When the pin refuses.
     fn hold(&mut self) -> Result<(), Self::Error>;
 
-    /// Lets the chip go.
+    /// Releases the chip from reset.
     ///
     /// # Errors
     /// When the pin refuses.
@@ -39,7 +39,7 @@ impl<P: OutputPin> Xshut for P {
     }
 }
 
-/// A board without the line: XSHUT is tied to the supply.
+/// A board on which XSHUT is connected to the supply.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoXshut;
 

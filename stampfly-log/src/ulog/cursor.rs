@@ -1,8 +1,8 @@
-//! Building a message in a fixed buffer and taking one apart, without a way to panic.
+//! Building and parsing messages in byte slices without panics.
 
 use core::fmt;
 
-/// Writes into a fixed buffer and remembers when something did not fit.
+/// Writes into a fixed buffer and records an overflow.
 pub(crate) struct Cursor<'a> {
     buffer: &'a mut [u8],
     length: usize,
@@ -26,7 +26,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// What was written, or `None` if it did not fit.
+    /// The number of bytes written; `None` after an overflow.
     pub(crate) fn finish(self) -> Option<usize> {
         (!self.overflow).then_some(self.length)
     }
@@ -39,14 +39,14 @@ impl fmt::Write for Cursor<'_> {
     }
 }
 
-/// Overwrites two bytes, if they exist.
+/// Overwrites the first two bytes; does nothing when there are fewer.
 pub(crate) fn put_u16(bytes: &mut [u8], value: u16) {
     if let Some(room) = bytes.first_chunk_mut() {
         *room = value.to_le_bytes();
     }
 }
 
-/// Takes values off the front of a slice.
+/// Reads values from the front of a slice.
 pub(crate) struct Take<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Take<'a> {
@@ -79,7 +79,7 @@ impl<'a> Take<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Everything that is left, as text.
+    /// All remaining bytes as text.
     pub(crate) fn text(&mut self) -> Option<&'a str> {
         let rest = core::mem::take(&mut self.0);
         core::str::from_utf8(rest).ok()

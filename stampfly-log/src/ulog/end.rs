@@ -1,35 +1,35 @@
-//! How far a log is whole.
+//! [`End`]: how much of a log could be read.
 
 use core::fmt;
 
-/// How far a log is whole. The [`Reader`](super::Reader) decides it; every program that reads logs
-/// says it with the sentence that this displays as.
+/// How much of a log could be read. The [`Reader`](super::Reader) determines it, and every program
+/// that reads logs prints its `Display` text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum End {
-    /// Every byte of it was read.
+    /// All bytes were read.
     #[default]
     Whole,
-    /// The file ends within a message, as after a crash or a broken download. Everything before was
-    /// read.
+    /// The file ends inside a message, as after a crash or an incomplete download. Everything
+    /// before was read.
     Cut {
         /// Byte offset of that message.
         at: usize,
         /// Bytes from there to the end of the file.
         rest: usize,
     },
-    /// Some of it is no message. Everything else was read.
+    /// Some bytes are not a valid message. Everything else was read.
     Damaged {
         /// Byte offset of the first damage.
         at: usize,
         /// Number of damaged places.
         places: usize,
-        /// Bytes that were passed over, in all places together.
+        /// Number of bytes skipped in all damaged places.
         skipped: usize,
     },
 }
 
 impl End {
-    /// Was every byte read?
+    /// Whether all bytes were read.
     #[must_use]
     pub const fn is_whole(self) -> bool {
         matches!(self, Self::Whole)

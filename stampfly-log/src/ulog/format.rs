@@ -1,8 +1,8 @@
-//! Formats: what the bytes of a sample mean, as the file itself says.
+//! Formats: the layout of samples, as declared in the file.
 //!
-//! [`Format::columns`] is the way from a sample's bytes to numbers for plots: one [`Column`] per
-//! scalar, arrays spread out; [`Format::unfolded`] is the same where fields may be formats
-//! themselves. To get the exact words of one of our own messages back, use
+//! [`Format::columns`] gives access to the numbers of a sample for plots: one [`Column`] per
+//! scalar, arrays expanded. [`Format::unfolded`] does the same for formats that contain other
+//! formats. To get the exact words of a message of the stack back, use
 //! [`Topic::decode`](super::Topic::decode).
 
 use core::fmt;
@@ -74,7 +74,8 @@ impl Scalar {
         self.row().1
     }
 
-    /// One value from the front of `bytes`, as `f64`: exact for everything but 64-bit integers beyond 2⁵³.
+    /// Reads one value from the front of `bytes` as `f64`. Exact, except for 64-bit integers beyond
+    /// 2⁵³.
     #[must_use]
     pub fn read(self, bytes: &[u8]) -> Option<f64> {
         Some(match self {
@@ -92,19 +93,19 @@ impl Scalar {
     }
 }
 
-/// Why a format cannot be laid out.
+/// Reason why a format has no valid layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FieldError<'a> {
-    /// Not `type name` or `type[count] name`.
+    /// Not of the form `type name` or `type[count] name`.
     Syntax(&'a str),
-    /// A type that is none of the basic ones: a nested format, or unknown.
+    /// A type that is not a basic one: a nested format or an unknown type.
     Nested(&'a str),
-    /// With this field a sample would be longer than a message can be.
+    /// This field makes the sample longer than a message can be.
     TooLong(&'a str),
     /// A type that is neither a basic one nor a format of the log.
     Unknown(&'a str),
-    /// A format that holds itself, or is too deep in others.
+    /// A format that contains itself, or is nested too deeply.
     TooDeep(&'a str),
     /// More fields than a sample can have.
     TooMany,
@@ -125,19 +126,20 @@ impl fmt::Display for FieldError<'_> {
 
 impl core::error::Error for FieldError<'_> {}
 
-/// One field of a format as written: `float[3] position`.
+/// The declaration of one field, such as `float[3] position`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Declaration<'a> {
-    /// Type name, without the brackets.
+    /// Name of the type, without brackets.
     pub type_name: &'a str,
-    /// Number of elements, if an array.
+    /// Number of elements of an array; `None` for a scalar.
     pub count: Option<usize>,
     /// Field name.
     pub name: &'a str,
 }
 
 impl<'a> Declaration<'a> {
-    /// Takes `type name` or `type[count] name` apart. Info and parameter keys are written the same way.
+    /// Parses `type name` or `type[count] name`. The keys of infos and parameters have the same
+    /// syntax.
     #[must_use]
     pub fn parse(text: &'a str) -> Option<Self> {
         let (type_text, name) = text.trim_ascii().split_once(' ')?;
@@ -163,14 +165,14 @@ impl<'a> Declaration<'a> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format<'a> {
-    /// The format's name; topics refer to it.
+    /// Name of the format, to which topics refer.
     pub name: &'a str,
     /// `type field;type field;…`
     pub fields: &'a str,
 }
 
 impl<'a> Format<'a> {
-    /// The fields as declared, padding included.
+    /// The declared fields, padding included.
     pub fn declarations(&self) -> impl Iterator<Item = Result<Declaration<'a>, FieldError<'a>>> + use<'a> {
         self.fields
             .split(';')
@@ -178,20 +180,20 @@ impl<'a> Format<'a> {
             .map(|text| Declaration::parse(text).ok_or(FieldError::Syntax(text)))
     }
 
-    /// One column per scalar, in byte order, padding left out. Ends after the first error, because the offsets
-    /// behind a field of unknown size are unknown.
+    /// One column per scalar, in byte order, without padding. Ends after the first error, because
+    /// the offsets after a field of unknown size are unknown.
     #[must_use]
     pub fn columns(&self) -> Columns<'a> {
         Columns { rest: self.fields, field: None, offset: 0 }
     }
 }
 
-/// Where one scalar of a sample lies.
+/// Location and type of one scalar in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column<'a> {
     /// The field's name.
     pub field: &'a str,
-    /// Place in the array, if the field is one.
+    /// Index in the array; `None` for a scalar field.
     pub index: Option<usize>,
     /// Type of the value.
     pub scalar: Scalar,
@@ -207,7 +209,7 @@ impl Column<'_> {
     }
 }
 
-/// See [`Format::columns`].
+/// Iterator returned by [`Format::columns`].
 #[derive(Clone, Debug)]
 pub struct Columns<'a> {
     rest: &'a str,
@@ -250,12 +252,13 @@ impl<'a> Iterator for Columns<'a> {
             let Some(scalar) = Scalar::from_name(declaration.type_name) else {
                 return self.end(FieldError::Nested(declaration.type_name));
             };
-            // A broken file must not become a loop over as many columns as it likes to claim.
+            // Bounds the number of columns, which a damaged file may claim to be arbitrarily large.
             let count = declaration.count.unwrap_or(1);
             let size = count.saturating_mul(scalar.size());
             if self.offset.saturating_add(size) > usize::from(u16::MAX) {
                 return self.end(FieldError::TooLong(text));
             }
+            // ULog's own convention for bytes that hold no data.
             if declaration.name.starts_with("_padding") {
                 self.offset += size;
             } else {

@@ -1,24 +1,24 @@
-//! One message of a log, borrowed from its bytes.
+//! [`Message`]: one message of a log, borrowed from its bytes.
 
 use super::{Declaration, Format, SYNC_MAGIC, Take};
 use stampfly_types::Instant;
 
-/// Compatibility flags and the places where data was appended after the flight.
+/// Compatibility flags, and offsets of data that was appended after the flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FlagBits {
-    /// Features a reader may ignore.
+    /// Features that a reader may ignore.
     pub compatible: [u8; 8],
-    /// Features a reader must know. Bit 0 of the first byte: data was appended.
+    /// Features that a reader must support. Bit 0 of the first byte: data was appended.
     pub incompatible: [u8; 8],
     /// Byte offsets of appended data, zero where unused.
     pub appended: [u64; 3],
 }
 
 impl FlagBits {
-    /// Data was appended, see `appended`.
+    /// Bit of the first incompatible byte: data was appended, see `appended`.
     pub const DATA_APPENDED: u8 = 1;
 
-    /// Are all incompatible features ones this crate knows?
+    /// Whether this crate supports all incompatible features.
     #[must_use]
     pub fn is_readable(&self) -> bool {
         let [first, rest @ ..] = self.incompatible;
@@ -35,7 +35,7 @@ impl FlagBits {
     }
 }
 
-/// The value of a parameter. ULog knows these two types only.
+/// The value of a parameter. ULog supports only these two types.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterValue {
     /// `float`
@@ -56,7 +56,7 @@ impl From<i32> for ParameterValue {
     }
 }
 
-/// How much a line of text matters; the levels of the Linux kernel.
+/// Severity of a line of text, with the levels of the Linux kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The vehicle is unusable.
@@ -93,14 +93,14 @@ impl Level {
         b'0' + self as u8
     }
 
-    /// PX4 writes the digit's character; plain numbers exist as well.
+    /// PX4 writes the digit as a character; other writers store the number itself.
     fn from_char(byte: u8) -> Option<Self> {
         let number = if byte < 8 { byte } else { byte.checked_sub(b'0')? };
         Self::ALL.get(usize::from(number)).copied()
     }
 }
 
-/// One message.
+/// One message of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Message<'a> {
@@ -108,7 +108,7 @@ pub enum Message<'a> {
     FlagBits(FlagBits),
     /// The layout of a kind of sample.
     Format(Format<'a>),
-    /// A fact about the flight. `key` holds type and name.
+    /// A fact about the flight.
     Info {
         /// Type, number of elements and name.
         key: Declaration<'a>,
@@ -117,69 +117,69 @@ pub enum Message<'a> {
     },
     /// A fact in several parts.
     MultiInfo {
-        /// Does this part go on where the one before of the same name ended?
+        /// Whether this part continues the previous one with the same name.
         continued: bool,
         /// Type, number of elements and name.
         key: Declaration<'a>,
         /// The bytes of the value.
         value: &'a [u8],
     },
-    /// A parameter's value at the start, or from here on.
+    /// The value of a parameter at the start of the log, or from this message on.
     Parameter {
         /// The parameter's name.
         name: &'a str,
         /// Its value.
         value: ParameterValue,
     },
-    /// A parameter's default.
+    /// The default of a parameter.
     ParameterDefault {
-        /// Bit 0: default of the system, bit 1: of the present configuration.
+        /// Bit 0: default of the system, bit 1: default of the present configuration.
         types: u8,
         /// The parameter's name.
         name: &'a str,
         /// Its default.
         value: ParameterValue,
     },
-    /// From here on, data with this number are samples of this topic.
+    /// Assigns a number to a topic. Data messages with this number that follow are its samples.
     Subscription {
-        /// Number of the data.
+        /// The number assigned.
         id: u16,
-        /// Tells apart several topics of one name.
+        /// Distinguishes topics with the same name.
         instance: u8,
         /// Name of the topic's format.
         topic: &'a str,
     },
-    /// No more data with this number.
+    /// Ends the data with this number.
     Unsubscription {
-        /// Number of the data.
+        /// The number of the topic.
         id: u16,
     },
     /// One sample.
     Data {
-        /// Number given by a subscription.
+        /// The number assigned by a subscription.
         id: u16,
-        /// The sample, laid out as its format says. Trailing padding may be missing.
+        /// The sample, in the layout of its format. Trailing padding may be missing.
         payload: &'a [u8],
     },
     /// A line of text.
     Text {
-        /// How much it matters.
+        /// Severity.
         level: Level,
-        /// Who wrote it, if the log says.
+        /// Tag of the source, if the log has one.
         tag: Option<u16>,
-        /// When.
+        /// Time of the line.
         at: Instant,
         /// The line.
         text: &'a str,
     },
-    /// A mark to find the way back after damage.
+    /// A mark at which a reader resynchronises after damage.
     Sync,
-    /// The log could not keep up.
+    /// Data is missing because the log could not keep up.
     Dropout {
-        /// For how long, milliseconds.
+        /// Length of the gap, ms.
         duration: u16,
     },
-    /// A type this crate does not know.
+    /// A type that this crate does not support.
     Unknown {
         /// The message's type.
         kind: u8,
@@ -189,7 +189,7 @@ pub enum Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// Takes a payload apart; `None` when it is not what its type promises.
+    /// Parses a payload; `None` when it does not have the structure of its type.
     pub(super) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
         let mut take = Take(payload);
         Some(match kind {

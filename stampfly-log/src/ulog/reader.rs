@@ -1,41 +1,40 @@
-//! Reading a log of any origin, borrowed, without a way to panic or to loop for ever.
+//! Reading logs of any origin, without copying, panics or endless loops.
 //!
-//! The reader yields messages in file order. Damage is an item of its own and not the end: a
-//! message whose inside is broken is skipped, and after damage to the framing reading goes on at
-//! the next [`Message::Sync`] or at the next appended part. A program that wants intact logs alone
-//! stops at the first error; all others read on and say with [`Reader::end`] how far the log is
-//! whole.
+//! The reader yields messages in file order. Damage is an item of the iteration and does not end
+//! it: a message with an invalid payload is skipped, and after damage to the framing the reader
+//! continues at the next [`Message::Sync`] or at the next appended part. A program that needs an
+//! intact log stops at the first error. All others continue and report [`Reader::end`].
 
 use super::{End, FlagBits, HEADER, MAGIC, Message, SYNC_MAGIC, Take};
 use core::fmt;
 use stampfly_types::Instant;
 
-/// What is wrong with a log.
+/// Kind of damage in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReadErrorKind {
-    /// The file does not begin as a ULog does.
+    /// The file does not begin with the header of a ULog.
     NotULog,
-    /// The log uses features this reader does not know and must not ignore.
+    /// The log uses features that this reader does not support and must not ignore.
     Incompatible,
-    /// A message of this type is not what its type promises. It was skipped.
+    /// A message does not have the structure of its type, which is given. It was skipped.
     Malformed(u8),
-    /// The file, or the part before appended data, ends inside a message; or the message's size is damaged, for it
-    /// reaches that end or over a sync mark.
+    /// The file, or the part before appended data, ends inside a message. Or the size of the
+    /// message is damaged: it extends beyond that end or across a sync mark.
     Truncated,
-    /// No message of ULog has this type, so the place where messages begin has been lost.
+    /// ULog has no message of this type, so the boundary between messages is lost.
     LostFraming(u8),
-    /// Nothing that is a message begins behind this one, so bytes of it may be missing, and those
-    /// of the next be in it.
+    /// No message begins after this one, so it may lack bytes of its own and contain bytes of the
+    /// next.
     NotFollowed,
 }
 
-/// Where and how a log is broken.
+/// Position and kind of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadError {
     /// Byte offset of the message.
     pub offset: usize,
-    /// What is wrong with it.
+    /// Kind of the damage.
     pub kind: ReadErrorKind,
 }
 
@@ -88,16 +87,18 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Checks the header and stands before the first message.
+    /// Checks the header. The iteration begins with the first message.
     ///
     /// # Errors
-    /// When this is no ULog, or one that must not be read by those who do not know its features.
+    /// When `bytes` is not a ULog, or uses features that this reader does not support and must not
+    /// ignore.
     pub fn new(bytes: &'a [u8]) -> Result<Self, ReadError> {
         let not_ulog = ReadError { offset: 0, kind: ReadErrorKind::NotULog };
         let mut take = Take(bytes.strip_prefix(&MAGIC).ok_or(not_ulog)?);
         let _version = take.u8().ok_or(not_ulog)?;
         let started = Instant::from_micros(take.u64().ok_or(not_ulog)?);
         let mut reader = Self { bytes, at: HEADER, started, flags: FlagBits::default(), end: End::Whole };
+        // The flags come first. A clone reads them, so that the iteration still yields them.
         if let Some(Ok(Message::FlagBits(flags))) = reader.clone().next() {
             if !flags.is_readable() {
                 return Err(ReadError { offset: HEADER, kind: ReadErrorKind::Incompatible });
@@ -107,7 +108,7 @@ impl<'a> Reader<'a> {
         Ok(reader)
     }
 
-    /// The instant the log was started.
+    /// Time at which the log was started.
     #[must_use]
     pub const fn started(&self) -> Instant {
         self.started
@@ -119,7 +120,7 @@ impl<'a> Reader<'a> {
         self.at
     }
 
-    /// How far the log is whole, as far as it has been read: complete when the iterator has ended.
+    /// How much of the log could be read so far. Final when the iterator has ended.
     ///
     /// ```
     /// use stampfly_log::ulog::{Definitions, End, Ram, Reader};
@@ -140,7 +141,7 @@ impl<'a> Reader<'a> {
         self.end
     }
 
-    /// Goes on behind damage, and remembers what it cost.
+    /// Continues after damage, and adds it to [`end`](Self::end).
     fn skip(&mut self, to: usize, kind: ReadErrorKind) -> Option<Result<Message<'a>, ReadError>> {
         let offset = core::mem::replace(&mut self.at, to);
         let skipped = to - offset;
@@ -149,7 +150,7 @@ impl<'a> Reader<'a> {
                 End::Cut { at: offset, rest: skipped }
             }
             End::Whole => End::Damaged { at: offset, places: 1, skipped },
-            // Nothing follows a cut.
+            // A cut is the end of the file, so nothing can follow it.
             End::Cut { at, rest } => End::Cut { at, rest },
             End::Damaged { at, places, skipped: before } => {
                 End::Damaged { at, places: places + 1, skipped: before + skipped }
@@ -158,26 +159,29 @@ impl<'a> Reader<'a> {
         Some(Err(ReadError { offset, kind }))
     }
 
-    /// End of the part that holds offset `at`: the nearest appended part behind it, or the end of the file.
+    /// End of the part that contains offset `at`: the next appended part, or the end of the file.
     fn part_end(&self, at: usize) -> usize {
+        // Without this flag the offsets have no meaning.
         let is_appended = self.flags.incompatible[0] & FlagBits::DATA_APPENDED != 0;
         let offsets = self.flags.appended.iter().filter(|_| is_appended);
         let offsets = offsets.filter_map(|offset| usize::try_from(*offset).ok());
         offsets.filter(|offset| *offset > at).min().unwrap_or(usize::MAX).min(self.bytes.len())
     }
 
-    /// Where to go on after damage at `at`: the next sync mark in this part, or the next part.
+    /// Where to continue after damage at `at`: the next sync mark in this part, or the next part.
     fn resume(&self, at: usize) -> usize {
         let end = self.part_end(at);
+        // From the byte after the damage on, so that every resumption makes progress.
         let rest = self.bytes.get(at + 1..end).unwrap_or_default();
         find_mark(rest).map_or(end, |skipped| at + 1 + skipped)
     }
 }
 
-/// Payloads from this size on are searched for sync marks: a damaged size swallows them.
+/// Payloads of at least this size are searched for sync marks, because a damaged size can include
+/// some.
 const SUSPICIOUS: usize = 256;
 
-/// Where a whole sync message begins.
+/// Offset of the first complete sync message.
 fn find_mark(bytes: &[u8]) -> Option<usize> {
     let [s0, s1, s2, s3, s4, s5, s6, s7] = SYNC_MAGIC;
     let mark = [8, 0, b'S', s0, s1, s2, s3, s4, s5, s6, s7];
@@ -201,12 +205,12 @@ impl<'a> Iterator for Reader<'a> {
         let (Some(kind), Some(payload)) = (kind, payload) else {
             return self.skip(self.resume(offset), ReadErrorKind::Truncated);
         };
-        // Types to come will be letters as well; anything else means that this is no message.
+        // Future types will be letters or digits as well; any other byte is not the type of a
+        // message.
         if !kind.is_ascii_alphanumeric() {
             return self.skip(self.resume(offset), ReadErrorKind::LostFraming(kind));
         }
-        // Flags and marks are of one length, and a log without its flags could be another than it
-        // seems.
+        // `B` and `S` have a fixed length. Without its flags, a log could be interpreted wrongly.
         let is_followed = take.0.get(2).is_none_or(u8::is_ascii_alphanumeric);
         if !is_followed && !matches!(kind, b'B' | b'S') {
             return self.skip(self.resume(offset), ReadErrorKind::NotFollowed);

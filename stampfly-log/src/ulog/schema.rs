@@ -1,17 +1,18 @@
-//! What a log is about: the topics whose samples it holds, and the runnables whose activations it holds.
+//! [`Schema`]: the topics and the activations that a log contains.
 
 use super::Topic;
 use crate::trace::ActivationTopic;
 
 /// The topics and activations of a log, by number.
 ///
-/// A list of topics is a schema (`&[Topic]`), a pair of lists is one (`(&[Topic], &[ActivationTopic])`), and a vehicle's
-/// tables are one without a list being made of them.
+/// Implemented for a list of topics (`&[Topic]`) and for a pair of lists
+/// (`(&[Topic], &[ActivationTopic])`). A vehicle's tables implement it directly, without making a
+/// list.
 pub trait Schema {
-    /// The topic with this number; `None` behind the last.
+    /// The topic with this number; `None` after the last one.
     fn topic(&self, index: usize) -> Option<Topic>;
 
-    /// The activations with this number; `None` behind the last.
+    /// The activations with this number; `None` after the last one.
     fn activation(&self, _index: usize) -> Option<ActivationTopic> {
         None
     }

@@ -1,14 +1,14 @@
-//! Where a log goes, and what can go wrong on the way.
+//! Destinations of a log, and errors of writing.
 
 use super::MAX_MESSAGE;
 use core::fmt;
 
-/// Where a log goes.
+/// Destination of a log.
 ///
 /// # Contract
-/// * Takes all of `bytes` or, with an error, none of them.
-/// * The first piece is the file's header; all others are whole messages of at most [`MAX_MESSAGE`] bytes, so a sink
-///   may refuse one without harm to the rest.
+/// * `write` takes all of `bytes` or, with an error, none of them.
+/// * The first call gets the file header; every other call gets one whole message of at most
+///   [`MAX_MESSAGE`] bytes. A sink may therefore refuse a message without corrupting the log.
 pub trait Sink {
     /// The sink's error.
     type Error;
@@ -27,7 +27,7 @@ impl<S: Sink> Sink for &mut S {
     }
 }
 
-/// A sink in memory. When full it refuses.
+/// A sink in memory. Refuses messages when it is full.
 #[derive(Debug)]
 pub struct Ram<'a> {
     memory: &'a mut [u8],
@@ -52,7 +52,7 @@ impl<'a> Ram<'a> {
         Self { memory, used: 0 }
     }
 
-    /// The log so far.
+    /// The log written so far.
     #[must_use]
     pub fn written(&self) -> &[u8] {
         self.memory.get(..self.used).unwrap_or_default()
@@ -69,23 +69,23 @@ impl Sink for Ram<'_> {
     }
 }
 
-/// Why a message was not written.
+/// Reason why a message was not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum WriteError<E> {
-    /// The sink refused it.
+    /// The sink refused the message.
     Sink(E),
-    /// It is longer than [`MAX_MESSAGE`].
+    /// The message is longer than [`MAX_MESSAGE`].
     TooLong,
     /// More topics than a log can number.
     TooManyTopics,
-    /// No such topic or activation.
+    /// The schema has no such topic or activation.
     UnknownTopic,
-    /// The number of words or inputs is not the topic's.
+    /// The number of words or inputs differs from the topic's.
     WordCount,
-    /// A word does not fit into the field of this name.
+    /// A word is out of range for the field of this name.
     OutOfRange(&'static str),
-    /// Two topics of this name have different fields, and so are not instances of one.
+    /// Two topics of this name have different fields, so they cannot be instances of one topic.
     TwoFormats(&'static str),
 }
 

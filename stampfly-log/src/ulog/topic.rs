@@ -1,49 +1,50 @@
-//! Topics: from the words of a message to the bytes of a sample and back, without loss.
+//! Topics: lossless conversion between the words of a message and the bytes of a sample.
 //!
-//! A ULog field is a scalar or an array of scalars, so a message is stored as the [leaves](stampfly_types::schema) of its
-//! schema: an `Option<f32>` named `range` as `range_present` and `range`, a message named `wind` as `wind_speed` and so on.
-//! ULog's own nested formats are not used: few tools read them.
+//! A ULog field is a scalar or an array of scalars, so a message is stored as the
+//! [leaves](stampfly_types::schema) of its schema: an `Option<f32>` named `range` as
+//! `range_present` and `range`, a message named `wind` as `wind_speed` and so on. ULog's nested
+//! formats are not used, because few tools read them.
 
 use super::cursor::Cursor;
 use super::{Scalar, TOPIC_HEAD, TOPIC_HEAD_SIZE, Take};
 use core::fmt::{self, Write};
 use stampfly_types::{FieldInfo, FieldKind, Instant, Leaf, leaves};
 
-/// A topic as the log knows it: a name and the schema of its message.
+/// A topic in a log: a name and the schema of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Topic {
-    /// The topic's name; letters, digits and underscores.
+    /// Name of the topic: letters, digits and underscores.
     pub name: &'static str,
-    /// The schema, [`Message::FIELDS`](stampfly_types::Message::FIELDS).
+    /// Schema, [`Message::FIELDS`](stampfly_types::Message::FIELDS).
     pub fields: &'static [FieldInfo],
 }
 
-/// One published message, as the log takes it.
+/// One published message, as input of the writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample<'a> {
     /// The instant the data is valid for.
     pub at: Instant,
-    /// The topic's running number of this sample.
+    /// Sequence number of the sample on its topic.
     pub generation: u32,
-    /// The message's words.
+    /// The words of the message.
     pub words: &'a [u32],
 }
 
-/// When a sample was valid, and which one of its topic it was.
+/// Time and sequence number of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
     /// The instant the data is valid for.
     pub at: Instant,
-    /// The topic's running number of this sample.
+    /// Sequence number of the sample on its topic.
     pub generation: u32,
 }
 
-/// Why words are no sample of a topic.
+/// Reason why words are not a sample of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WordsError {
-    /// Too many or too few.
+    /// Too many or too few words.
     Count,
-    /// A word does not fit into the field's type.
+    /// A word is out of range for the field of this name.
     Range(&'static str),
 }
 
@@ -54,9 +55,10 @@ impl Topic {
         self.fields.iter().map(|field| field.words).sum()
     }
 
-    /// Is a sample of this topic one of the other, byte by byte?
+    /// Whether samples of both topics have the same bytes, names and units.
     pub(super) fn is_stored_as(&self, other: &Self) -> bool {
-        // Compared as they are written: the schemas hold each other, and comparing them would be recursive.
+        // Compares the leaves, since schemas contain each other and a comparison of them would
+        // recurse.
         let mut theirs = leaves(other.fields);
         let same = leaves(self.fields).all(|leaf| {
             theirs.next().is_some_and(|other| {
@@ -73,11 +75,13 @@ impl Topic {
             + leaves(self.fields).map(|leaf| stored(&leaf)).map(|(scalar, count)| scalar.size() * count).sum::<usize>()
     }
 
-    /// The words of a sample, from its payload. Exactly the words that were written.
+    /// Reads a sample from its payload, and returns exactly the words that were written.
     ///
-    /// `None` when the payload or `words` has not the size of this topic; `words` is then unspecified. Check with
-    /// [`is_format`](Self::is_format) that the log means the same topic.
+    /// `None` when the payload or `words` does not have the size of this topic; `words` is
+    /// unspecified then. Check with [`is_format`](Self::is_format) first that the log's format is
+    /// that of this topic.
     pub fn decode(&self, payload: &[u8], words: &mut [u32]) -> Option<Stamp> {
+        // The sizes are equal from here on, so every read below succeeds.
         if payload.len() != self.size() || words.len() != self.words() {
             return None;
         }
@@ -104,7 +108,7 @@ impl Topic {
         Some(stamp)
     }
 
-    /// Is this format the one a log of ours has for this topic?
+    /// Whether the format is the one that this crate writes for this topic.
     #[must_use]
     pub fn is_format(&self, format: &super::Format<'_>) -> bool {
         let mut rest = Expect(format.fields);
@@ -120,7 +124,7 @@ impl Topic {
         })
     }
 
-    /// Writes a sample's payload.
+    /// Writes the payload of a sample.
     #[inline]
     pub(super) fn encode(&self, sample: &Sample<'_>, out: &mut Cursor<'_>) -> Result<(), WordsError> {
         out.put(&sample.at.as_micros().to_le_bytes());
@@ -136,7 +140,8 @@ impl Topic {
                 Scalar::I16 => {
                     put_narrow(out, words, |word| i16::try_from(word.cast_signed()).ok().map(i16::to_le_bytes))
                 }
-                // Two words of a 64-bit number are low first, as little-endian bytes are.
+                // The two words of a 64-bit number are stored low word first, which is
+                // little-endian.
                 _ => put_narrow(out, words, |word| Some(word.to_le_bytes())),
             }
             .ok_or(WordsError::Range(leaf.name.field()))?;
@@ -154,7 +159,7 @@ fn put_narrow<const N: usize>(
     words.iter().try_for_each(|word| bytes(*word).map(|bytes| out.put(&bytes)))
 }
 
-/// How a leaf is stored: the type and the number of elements.
+/// Type and number of elements with which a leaf is stored.
 #[inline]
 fn stored(leaf: &Leaf) -> (Scalar, usize) {
     let scalar = match leaf.kind {
@@ -173,13 +178,13 @@ fn stored(leaf: &Leaf) -> (Scalar, usize) {
             Some(0x100..) => Scalar::U16,
             _ => Scalar::U8,
         },
-        // A kind younger than this crate: its words as they are.
+        // A kind that was added after this code: stores its words unchanged.
         _ => return (Scalar::U32, leaf.size()),
     };
     (scalar, leaf.count)
 }
 
-/// Accepts exactly the text it holds, piece by piece.
+/// Accepts exactly the text it contains, in pieces.
 struct Expect<'a>(&'a str);
 
 impl Write for Expect<'_> {

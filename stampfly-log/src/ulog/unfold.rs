@@ -1,20 +1,19 @@
-//! Formats within formats, unfolded into scalars with names as pyulog gives them: `current.lat`,
-//! `esc[0].esc_rpm`.
+//! Expands nested formats into scalars, with names as in pyulog: `current.lat`, `esc[0].esc_rpm`.
 //!
-//! A file may claim formats that hold themselves, or arrays without end: an unfolding ends with an
-//! error at [`MAX_DEPTH`] formats within one another and at [`MAX_STEPS`] steps.
+//! A file may contain formats that contain themselves, or very long arrays. An expansion therefore
+//! ends with an error at [`MAX_DEPTH`] nested formats and at [`MAX_STEPS`] steps.
 
 use super::{Declaration, FieldError, Format, Scalar};
 use core::fmt;
 
-/// How many formats may be within one another, the topic's own included. PX4's logs have two.
+/// Maximum number of nested formats, the topic's own included. PX4's logs have two.
 pub(super) const MAX_DEPTH: usize = 6;
-/// Declarations and elements that one unfolding looks at. A sample has at most 65,535 bytes.
+/// Maximum number of declarations and elements in one expansion. A sample has at most 65,535 bytes.
 pub(super) const MAX_STEPS: usize = 1 << 16;
-/// So many letters of a declaration are a step more.
+/// Number of bytes of a declaration that count as one step.
 const LETTERS: usize = 64;
 
-/// The way to a scalar through its formats. Displays as `esc[0].esc_rpm`.
+/// Path to a scalar through nested formats. Displays as `esc[0].esc_rpm`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path<'a> {
     steps: [Step<'a>; MAX_DEPTH],
@@ -28,7 +27,7 @@ struct Step<'a> {
 }
 
 impl<'a> Path<'a> {
-    /// The same without the place in the last array: what all elements of `esc[0].q[2]` belong to.
+    /// The path without the index of its last array, common to all elements of an array.
     #[must_use]
     pub fn field(mut self) -> Self {
         if let Some(last) = self.depth.checked_sub(1).and_then(|last| self.steps.get_mut(last)) {
@@ -37,7 +36,7 @@ impl<'a> Path<'a> {
         self
     }
 
-    /// Is it this field of the topic's own format?
+    /// Whether this is the given field of the topic's own format.
     #[must_use]
     pub fn is(&self, field: &str) -> bool {
         matches!(self.steps(), [Step { field: own, index: None }] if *own == field)
@@ -61,10 +60,10 @@ impl fmt::Display for Path<'_> {
     }
 }
 
-/// Where one scalar of a sample lies.
+/// Location and type of one scalar in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnfoldedColumn<'a> {
-    /// The way to it.
+    /// Path to the scalar.
     pub path: Path<'a>,
     /// Type of the value.
     pub scalar: Scalar,
@@ -72,23 +71,23 @@ pub struct UnfoldedColumn<'a> {
     pub offset: usize,
 }
 
-/// See [`Format::unfolded`].
+/// Iterator returned by [`Format::unfolded`].
 #[derive(Clone, Debug)]
 pub struct Unfolded<'a, F> {
     formats: F,
-    /// The formats that are open, the topic's own first.
+    /// Formats being expanded, the topic's own first.
     open: [Open<'a>; MAX_DEPTH],
     depth: usize,
     offset: usize,
     steps: usize,
 }
 
-/// A format that is being unfolded.
+/// A format that is being expanded.
 #[derive(Clone, Copy, Debug, Default)]
 struct Open<'a> {
-    /// Its fields that are still to come.
+    /// Declarations that follow the current field.
     rest: &'a str,
-    /// The one that is being unfolded, and how many of its elements have been.
+    /// The current field, and the number of its elements already expanded.
     field: Option<(Declaration<'a>, Kind<'a>, usize)>,
 }
 
@@ -99,9 +98,9 @@ enum Kind<'a> {
 }
 
 impl<'a> Format<'a> {
-    /// One column per scalar, in byte order, padding left out, with the fields of formats that
-    /// `formats` finds in their place. Ends after the first error, because the offsets behind a
-    /// field of unknown size are unknown.
+    /// One column per scalar, in byte order, without padding. Fields whose type `formats` finds are
+    /// replaced by the fields of that format. Ends after the first error, because the offsets after
+    /// a field of unknown size are unknown.
     ///
     /// ```
     /// use stampfly_log::ulog::Format;
@@ -125,8 +124,8 @@ impl<'a> Format<'a> {
 }
 
 impl<'a, F: Fn(&str) -> Option<Format<'a>>> Unfolded<'a, F> {
-    /// Declarations and elements looked at so far, long declarations several times: what the
-    /// unfolding has cost.
+    /// Number of declarations and elements processed so far, with long declarations counted several
+    /// times: the cost of the expansion.
     #[must_use]
     pub const fn steps(&self) -> usize {
         self.steps
@@ -178,10 +177,12 @@ impl<'a, F: Fn(&str) -> Option<Format<'a>>> Iterator for Unfolded<'a, F> {
                     }
                 }
                 Some(_) => open.field = None,
+                // All fields of this format are done: continue with the enclosing one.
                 None if open.rest.is_empty() => self.depth -= 1,
                 None => {
                     let (text, rest) = open.rest.split_once(';').unwrap_or((open.rest, ""));
                     open.rest = rest;
+                    // Bounds the time for declarations of any length, not only their number.
                     self.steps += text.len() / LETTERS;
                     if text.trim_ascii().is_empty() {
                         continue;
@@ -194,6 +195,7 @@ impl<'a, F: Fn(&str) -> Option<Format<'a>>> Iterator for Unfolded<'a, F> {
                         open.field = Some((declaration, Kind::Fields(format.fields), 0));
                         continue;
                     };
+                    // Checked before the loop over the elements, whose number the file chooses.
                     let size = declaration.count.unwrap_or(1).saturating_mul(scalar.size());
                     if self.offset.saturating_add(size) > usize::from(u16::MAX) {
                         return self.end(FieldError::TooLong(text));
@@ -215,7 +217,7 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
-    /// The last column or error of `own`, among these formats.
+    /// The last column or error of `own`, given these formats.
     fn last(formats: &[(&'static str, &'static str)]) -> Result<std::string::String, std::string::String> {
         let find =
             |name: &str| formats.iter().find(|(known, _)| *known == name).map(|(name, fields)| Format { name, fields });

@@ -1,11 +1,11 @@
-//! Writing a log, message by message, into anything that takes bytes.
+//! Writing a log, message by message, to a sink.
 //!
-//! A log has two parts: definitions (facts, parameters, formats) and data. [`Definitions`] writes the first and
-//! becomes a [`Writer`] for the second, so nobody can define something too late.
+//! A log has two parts: definitions (facts, parameters, formats) and data. [`Definitions`] writes
+//! the first and turns into a [`Writer`] for the second, so that late definitions do not compile.
 //!
-//! The writer allocates nothing and never blocks. When the sink cannot keep up it refuses a message as a whole; the
-//! writer counts it and puts a dropout mark before the next message that gets through, so a reader knows that and
-//! for how long data is missing. For a sink that must never lose anything, stop at the first error instead.
+//! The writer neither allocates nor blocks. A sink that cannot keep up refuses whole messages. The
+//! writer counts them and writes a dropout mark before the next message that the sink accepts, so
+//! that a reader sees the gap and its length. When no loss is acceptable, stop at the first error.
 
 use super::Schema;
 use super::cursor::Cursor;
@@ -18,20 +18,20 @@ use crate::trace::{self, TOPIC_PREFIX};
 use core::fmt::{self, Write};
 use stampfly_types::{ActivationRecord, FieldKind, Instant, leaves};
 
-/// Size and type in front of each payload.
+/// Length of the size and the type before each payload.
 const MESSAGE_HEAD: usize = 3;
 
 /// Bytes of a blob in one message; the rest of [`MAX_MESSAGE`] is for its key.
 const BLOB_PART: usize = MAX_MESSAGE - 256;
 
-/// Makes messages in its buffer and hands them to the sink.
+/// Builds messages in its buffer and passes them to the sink.
 struct Output<S> {
     sink: S,
     buffer: [u8; MAX_MESSAGE],
 }
 
 impl<S: Sink> Output<S> {
-    /// Makes one message and writes it.
+    /// Builds one message and writes it.
     #[inline]
     fn message(&mut self, kind: u8, body: impl FnOnce(&mut Cursor<'_>)) -> Result<(), WriteError<S::Error>> {
         self.try_message(kind, |out| {
@@ -40,7 +40,7 @@ impl<S: Sink> Output<S> {
         })
     }
 
-    /// Makes one message and writes it, unless making it fails.
+    /// Builds one message and writes it, unless building fails.
     #[inline]
     fn try_message(
         &mut self,
@@ -54,11 +54,13 @@ impl<S: Sink> Output<S> {
             WordsError::Range(field) => WriteError::OutOfRange(field),
         })?;
         let length = cursor.finish().ok_or(WriteError::TooLong)?;
+        // The size is known only after the body has been written; `MAX_MESSAGE` fits into 16 bits.
         put_u16(&mut self.buffer, (length - MESSAGE_HEAD) as u16);
         self.sink.write(self.buffer.get(..length).unwrap_or_default()).map_err(WriteError::Sink)
     }
 
-    /// A text info whose key is `prefix` + `name` and whose value `text` writes.
+    /// Writes an info with this key. `text` writes the value, once for its length and once for
+    /// real.
     fn info(
         &mut self,
         key: fmt::Arguments<'_>,
@@ -66,7 +68,7 @@ impl<S: Sink> Output<S> {
     ) -> Result<(), WriteError<S::Error>> {
         let mut length = Count(0);
         let mut key_length = Count(0);
-        // Counting and the cursor never fail: what does not fit is reported when the message is finished.
+        // `Count` and `Cursor` never fail. An overflow is reported when the message is finished.
         let _ = text(&mut length);
         let _ = write!(key_length, "char[{}] {key}", length.0);
         let key_length = u8::try_from(key_length.0).map_err(|_| WriteError::TooLong)?;
@@ -130,15 +132,15 @@ impl<S: Sink> Definitions<S> {
         Ok(Self(output))
     }
 
-    /// Notes a fact. Viewers know `sys_name`, `ver_hw`, `ver_sw` and `ver_sw_branch`.
+    /// Writes a fact. Viewers display `sys_name`, `ver_hw`, `ver_sw` and `ver_sw_branch`.
     ///
     /// # Errors
-    /// When the sink refuses, or key and text are too long together.
+    /// When the sink refuses, or key and text together are too long.
     pub fn info(&mut self, key: &str, text: &str) -> Result<(), WriteError<S::Error>> {
         self.0.info(format_args!("{key}"), |out| out.write_str(text))
     }
 
-    /// Notes a parameter's value at the start.
+    /// Writes the value of a parameter at the start.
     ///
     /// # Errors
     /// When the sink refuses, or the name is longer than about 245 bytes.
@@ -146,27 +148,30 @@ impl<S: Sink> Definitions<S> {
         self.0.parameter(name, value)
     }
 
-    /// Writes what explains these topics and starts the data.
+    /// Writes the descriptions of the topics and starts the data part.
     ///
-    /// A topic's number, for [`Writer::sample`], is its place in the schema. Topics of one name are its instances, as two range
-    /// finders are: the first is instance 0, and viewers show them beside each other.
+    /// The number of a topic, for [`Writer::sample`], is its index in the schema. Topics with the
+    /// same name, such as those of two range finders, are instances: the first is instance 0, and
+    /// viewers group them.
     ///
     /// # Errors
-    /// When the sink refuses, a topic has a sample or a description longer than [`MAX_MESSAGE`], two of one name have
-    /// different fields, or there are more than 65 536 topics or 256 of one name.
+    /// When the sink refuses, when a sample or a description is longer than [`MAX_MESSAGE`], when
+    /// two topics with the same name have different fields, or with more than 65 536 topics or 256
+    /// of one name.
     pub fn data<T: Schema>(mut self, schema: T) -> Result<Writer<S, T>, WriteError<S::Error>> {
         let output = &mut self.0;
         let topics = || (0..).map_while(|index| schema.topic(index));
         let activations = || (0..).map_while(|index| schema.activation(index));
-        // Those of one name before this one.
+        // Number of topics with the same name before this one.
         let before =
             |index: usize, name: &str| topics().take(index).filter(move |earlier| earlier.name == name).count();
         for (index, topic) in topics().enumerate() {
+            // Two bytes for the topic's number.
             if topic.size() + MESSAGE_HEAD + 2 > MAX_MESSAGE {
                 return Err(WriteError::TooLong);
             }
             if let Some(first) = topics().take(index).find(|first| first.name == topic.name) {
-                // Another instance: what explains the first explains it.
+                // Another instance: it uses the descriptions of the first one.
                 if !first.is_stored_as(&topic) {
                     return Err(WriteError::TwoFormats(topic.name));
                 }
@@ -211,23 +216,24 @@ impl<S: Sink> Definitions<S> {
     }
 }
 
-/// The second part of a log: what happened.
+/// The second part of a log: its data.
 ///
-/// See [`Definitions`] for how to get one and the [crate documentation](crate) for an example.
+/// Made by [`Definitions::data`]. The [crate documentation](crate) contains an example.
 pub struct Writer<S, T> {
     output: Output<S>,
     schema: T,
-    /// Number of topics: activations are numbered behind them.
+    /// Number of topics. The numbers of activations follow.
     topics: usize,
     losing_since: Option<Instant>,
     lost: u32,
 }
 
 impl<S: Sink, T: Schema> Writer<S, T> {
-    /// Writes one sample of the topic with this place in the table.
+    /// Writes one sample of the topic with this index in the schema.
     ///
     /// # Errors
-    /// When the sink refuses (counted as lost), there is no such topic, or the words are none of its samples.
+    /// When the sink refuses (counted as lost), when there is no such topic, or when the words are
+    /// not a sample of this topic.
     pub fn sample(&mut self, topic: usize, sample: &Sample<'_>) -> Result<(), WriteError<S::Error>> {
         let schema = self.schema.topic(topic).ok_or(WriteError::UnknownTopic)?;
         self.record(sample.at, b'D', |out| {
@@ -239,13 +245,15 @@ impl<S: Sink, T: Schema> Writer<S, T> {
     /// Writes one activation.
     ///
     /// # Errors
-    /// When the sink refuses (counted as lost), no activation topic has this index, or the number of inputs differs.
+    /// When the sink refuses (counted as lost), when no activation topic has this index, or when
+    /// the number of inputs differs.
     pub fn activation(&mut self, record: &ActivationRecord) -> Result<(), WriteError<S::Error>> {
         let mut topics = (0..).map_while(|index| self.schema.activation(index)).enumerate();
         let (place, topic) = topics.find(|(_, topic)| topic.index == record.index).ok_or(WriteError::UnknownTopic)?;
         if topic.inputs != record.inputs().len() {
             return Err(WriteError::WordCount);
         }
+        // `data` has numbered all topics and activations with 16 bits.
         let id = (self.topics + place) as u16;
         self.record(record.now, b'D', |out| {
             out.put(&id.to_le_bytes());
@@ -267,7 +275,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         })
     }
 
-    /// Notes that a parameter has this value from now on.
+    /// Writes the new value of a parameter, in force from here on.
     ///
     /// # Errors
     /// When the sink refuses, or the name is longer than about 245 bytes.
@@ -275,10 +283,12 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         self.output.parameter(name, value)
     }
 
-    /// Writes bytes of any length under a key, in parts: a picture, a state. Other programs skip them.
+    /// Writes bytes of any length under a key, in several messages: an image, a state. Other
+    /// programs ignore them.
     ///
     /// # Errors
-    /// When the sink refuses (counted as lost) or the key is longer than about 200 bytes. The parts before are written.
+    /// When the sink refuses (counted as lost) or the key is longer than about 200 bytes. The parts
+    /// before the error have been written.
     pub fn blob(&mut self, at: Instant, key: &str, bytes: &[u8]) -> Result<(), WriteError<S::Error>> {
         for (index, part) in bytes.chunks(BLOB_PART).enumerate() {
             let mut length = Count(0);
@@ -294,12 +304,12 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         Ok(())
     }
 
-    /// Notes that something was lost before it reached this writer. A dropout mark comes before the next message.
+    /// Records a loss upstream of this writer. A dropout mark precedes the next message.
     pub fn mark_loss(&mut self, at: Instant) {
         self.losing_since.get_or_insert(at);
     }
 
-    /// Writes a mark at which a reader of a damaged log can find its way back. Once a second is plenty.
+    /// Writes a mark at which a reader resynchronises after damage. Once a second is sufficient.
     ///
     /// # Errors
     /// When the sink refuses.
@@ -307,7 +317,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         self.output.message(b'S', |out| out.put(&SYNC_MAGIC))
     }
 
-    /// How many messages the sink has refused so far.
+    /// Number of messages that the sink has refused.
     #[must_use]
     pub const fn lost(&self) -> u32 {
         self.lost
@@ -319,13 +329,13 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         &self.output.sink
     }
 
-    /// Ends the log and gives the sink back. The log is complete at every moment; nothing is written here.
+    /// Ends the log and returns the sink. Writes nothing, because the log is complete at any time.
     #[must_use]
     pub fn into_sink(self) -> S {
         self.output.sink
     }
 
-    /// Writes a message that belongs to the instant `at`, after a dropout mark if messages were lost before it.
+    /// Writes a message with the stamp `at`, preceded by a dropout mark if messages were lost.
     #[inline]
     fn record(
         &mut self,
@@ -335,6 +345,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
     ) -> Result<(), WriteError<S::Error>> {
         let mut result = Ok(());
         if let Some(since) = self.losing_since {
+            // At least a millisecond: a dropout of zero would not show as a gap.
             let millis = u16::try_from(at.since(since).as_micros() / 1_000).unwrap_or(u16::MAX).max(1);
             result = self.output.message(b'O', |out| out.put(&millis.to_le_bytes()));
             if result.is_ok() {
@@ -344,6 +355,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
         if result.is_ok() {
             result = self.output.try_message(kind, body);
         }
+        // Other errors are mistakes of the caller, not losses.
         if let Err(WriteError::Sink(_)) = result {
             self.lost = self.lost.saturating_add(1);
             self.losing_since.get_or_insert(at);
@@ -352,7 +364,7 @@ impl<S: Sink, T: Schema> Writer<S, T> {
     }
 }
 
-/// Counts what is written to it.
+/// Counts the bytes written to it.
 struct Count(usize);
 
 impl Write for Count {
@@ -362,7 +374,7 @@ impl Write for Count {
     }
 }
 
-/// `key=value key=value …`
+/// Writes `key=value key=value …`.
 fn separated<K: fmt::Display, V: fmt::Display>(
     pairs: impl Iterator<Item = (K, V)>,
     out: &mut dyn Write,
@@ -389,8 +401,9 @@ mod tests {
         }
     }
 
-    /// The file `pyulog` 1.3.0 reads without complaint, made by hand from the format description. Its topic is not
-    /// one of ours (no generation), so format and data go through the message level.
+    /// A file that `pyulog` 1.3.0 reads without errors, made manually from the format description.
+    /// Its topic has no generation and is therefore not one of the stack's, so format and data are
+    /// read as messages.
     #[test]
     fn a_hand_built_log_is_written_byte_for_byte() {
         let mut log = Definitions::start(Bytes(Vec::new()), Instant::from_micros(1_000)).unwrap();

@@ -1,4 +1,4 @@
-//! What the tests share: a growing sink, topics of every kind, a small log.
+//! Shared by the tests: a growing sink, topics of every kind, a small log.
 
 use stampfly_log::ActivationTopic;
 use stampfly_log::ulog::{Definitions, Level, Sample, Sink, Topic, Writer};
@@ -21,7 +21,7 @@ impl Sink for Bytes {
 }
 
 message! {
-    /// A message in a message.
+    /// A nested message.
     pub struct Part {
         /// An option in a message in an array.
         known: Option<Duration> ["us"],
@@ -31,31 +31,31 @@ message! {
 }
 
 message! {
-    /// One field of every kind the messages of the stack do not use.
+    /// One field of every kind that the messages of the stack do not use.
     pub struct Odd {
         /// Two words.
         wide: u64 ["us"],
         /// An array of two words each.
         wides: [u64; 2] ["us"],
-        /// Sign must survive.
+        /// Tests sign extension.
         signed: i16,
-        /// Sign must survive.
+        /// Tests sign extension.
         signeds: [i16; 3],
         /// Sixteen bits.
         half: u16,
-        /// Sign must survive.
+        /// Tests sign extension.
         integer: i32,
         /// Time.
         at: Instant ["us"],
-        /// Sign must survive.
+        /// Tests sign extension.
         both_ways: i64 ["us"],
         /// Sixteen digits.
         precise: f64,
-        /// Sign must survive.
+        /// Tests sign extension.
         small: i8,
-        /// More than `Default` knows.
+        /// Longer than the arrays that implement `Default`.
         many: [i8; 40],
-        /// A value or none.
+        /// An optional value.
         maybe: Option<Vec3> ["m/s"],
         /// Messages in an array.
         part: [Part; 2],
@@ -88,7 +88,7 @@ pub fn start() -> Writer<Bytes, (&'static [Topic], &'static [ActivationTopic])> 
     log.data((TOPICS, ACTIVATIONS)).unwrap()
 }
 
-/// A log with at least one message of every type the writer knows.
+/// A log with at least one message of every type that the writer supports.
 pub fn small_log() -> Vec<u8> {
     let mut log = start();
     for step in 0..20u32 {

@@ -1,4 +1,4 @@
-//! Logs that others wrote, and logs that were damaged.
+//! Logs of other writers, and damaged logs.
 
 use crate::common::{TOPICS, small_log};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use stampfly_log::ulog::{
 };
 use stampfly_types::Instant;
 
-/// A log written by hand from the format description and read without complaint by `pyulog` 1.3.0.
+/// A log made manually from the format description, which `pyulog` 1.3.0 reads without errors.
 const HAND_BUILT: &[u8] = include_bytes!("../hand_built.ulog");
 
 #[test]
@@ -50,7 +50,7 @@ fn the_hand_built_log_is_read() {
     );
 }
 
-/// A header, and flags that name one appended part.
+/// A header, and flags that list one appended part.
 fn head(appended: u64, incompatible: u8) -> Vec<u8> {
     let mut log = HAND_BUILT[..16].to_vec();
     log.extend([40, 0, b'B', 0, 0, 0, 0, 0, 0, 0, 0, incompatible, 0, 0, 0, 0, 0, 0, 0]);
@@ -125,7 +125,7 @@ fn framing_is_found_again_at_the_next_mark() {
     assert_eq!(items(&log), [Err(ReadErrorKind::Truncated), Ok(Message::Sync), Ok(Message::Dropout { duration: 3 })]);
 }
 
-/// Reads everything there is to read; the reader must get through, in at most as many steps as there are bytes.
+/// Reads the whole log. The reader must finish, in at most as many steps as there are bytes.
 fn read_all(log: &[u8]) -> (usize, usize) {
     let Ok(mut reader) = Reader::new(log) else { return (0, 0) };
     let (mut intact, mut broken) = (0, 0);
@@ -192,7 +192,7 @@ fn the_end_says_what_was_not_read() {
         let expected = if at == length { End::Whole } else { End::Cut { at, rest: length - at } };
         assert_eq!(end(&log[..length]), expected, "{length}");
     }
-    // A message that is none, twice: the text of a format that is no text.
+    // Two invalid messages: formats whose text is not UTF-8.
     let formats: Vec<_> = whole.windows(2).filter(|ends| log.get(ends[0] + 2) == Some(&b'F')).take(2).collect();
     let mut damaged = log.clone();
     formats.iter().for_each(|ends| damaged[ends[0] + 3] = 0xff);
@@ -200,8 +200,8 @@ fn the_end_says_what_was_not_read() {
     assert_eq!(end(&damaged), End::Damaged { at, places: 2, skipped });
     let sentence = format!("damaged at byte {at} and in 1 places more: {skipped} bytes were passed over");
     assert_eq!(end(&damaged).to_string(), sentence);
-    // Zeros at the end, as a disk leaves them, are damage: no message begins so, and the last one
-    // before may be part of it.
+    // Zeros at the end, as some file systems leave them, count as damage: no message begins with a
+    // zero byte, and the last message before them may be incomplete.
     let (zeros, last) = ([&log[..], &[0; 100]].concat(), whole[whole.len() - 2]);
     assert_eq!(end(&zeros), End::Damaged { at: last, places: 1, skipped: zeros.len() - last });
 }
@@ -216,7 +216,8 @@ fn one_flipped_bit_costs_no_more_than_the_way_to_the_next_mark() {
             break reader.offset();
         }
     };
-    // Behind the first mark there is one every seventeen messages; a wrong size may swallow the next one as well.
+    // After the first mark there is one every seventeen messages. A damaged size may include the
+    // next one as well.
     for offset in first_mark..log.len() {
         for bit in 0..8 {
             let mut damaged = log.clone();

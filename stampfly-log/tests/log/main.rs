@@ -1,5 +1,5 @@
-//! Logs, written, read and damaged. One binary, because each would link writer and reader again:
-//! `cargo test -p stampfly-log --test log hostile` runs one file.
+//! Tests of writing, reading and damaged logs. They are one binary, because each binary would link
+//! writer and reader again; `cargo test -p stampfly-log --test log hostile` runs one file.
 
 mod common;
 mod hostile;

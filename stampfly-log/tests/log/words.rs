@@ -1,4 +1,5 @@
-//! What is written is read: every word of every message, every activation, whatever the bits.
+//! Round trips: every word of every message and every activation is read as it was written, for any
+//! bits.
 
 use crate::common::{ACTIVATIONS, Bytes, Odd, TOPICS, small_log, start};
 use proptest::prelude::*;
@@ -8,7 +9,8 @@ use stampfly_types::messages::{FlightStatus, PowerData, TofData};
 use stampfly_types::{ActivationRecord, InputRecord};
 use stampfly_types::{FieldKind, Instant, Message as _, leaves};
 
-/// Words a message of this topic can have: any bits where any bits are allowed, small numbers where not.
+/// Words that a message of this topic can have: any bits where all are valid, small numbers
+/// elsewhere.
 fn words(topic: &Topic) -> impl Strategy<Value = Vec<u32>> + use<> {
     let fields = topic.fields;
     prop::collection::vec(any::<u32>(), topic.words()).prop_map(move |mut words| {
@@ -46,7 +48,7 @@ fn samples(log: &[u8]) -> Vec<(usize, u64, u32, Vec<u32>)> {
     samples
 }
 
-/// Numbers, instances and names of the topics that a log subscribes.
+/// Number, instance and name of every topic that a log subscribes.
 fn subscriptions(log: &[u8]) -> Vec<(u16, u8, String)> {
     let of = |message| match message {
         Message::Subscription { id, instance, topic } => Some((id, instance, topic.to_owned())),
@@ -181,7 +183,7 @@ fn too_long_a_key_is_an_error_and_a_key_at_the_limit_is_not() {
     assert_eq!(log.info("k", &"v".repeat(3_000)), Err(WriteError::TooLong));
 }
 
-/// Takes nothing while `closed`.
+/// Refuses all messages while `closed`.
 struct Gate {
     bytes: Vec<u8>,
     closed: bool,
@@ -194,7 +196,7 @@ impl Sink for &mut Gate {
     }
 }
 
-/// A sink that can be closed from outside while a writer has it.
+/// A sink that can be closed from outside while a writer owns it.
 struct Shared<'a>(&'a std::cell::RefCell<Gate>);
 
 impl Sink for Shared<'_> {

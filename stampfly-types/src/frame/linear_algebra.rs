@@ -1,4 +1,4 @@
-//! From and into nalgebra's types, for those who work with matrices.
+//! Conversions from and to nalgebra's types, for matrix algebra.
 
 use super::{NotUnit, Quat, Vec3};
 use core::ops::Mul;
@@ -42,7 +42,7 @@ impl TryFrom<Quaternion<f32>> for Quat {
     }
 }
 
-/// The rotation matrix: its columns are the body's axes in the world's.
+/// The rotation matrix. Its columns are the body's axes in the world frame.
 impl From<Quat> for Matrix3<f32> {
     #[inline]
     fn from(quaternion: Quat) -> Self {
@@ -68,7 +68,7 @@ mod tests {
             .prop_map(|[w, x, y, z]| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).into())
     }
 
-    // To the last bit: a log of one must replay with the other.
+    // Equal to the last bit: a log recorded with one type must replay with the other.
     proptest! {
         #[test]
         fn vectors_count_as_nalgebras_do(a in vectors(), b in vectors(), k in -10.0f32..10.0) {

@@ -1,12 +1,13 @@
-//! An attitude, and the arithmetic that needs no angle.
+//! Attitude quaternions and their arithmetic without trigonometric functions.
 //!
-//! Quaternions multiply as Hamilton's do, the scalar is named first. What needs sines is in [`rotation`](super::rotation).
+//! Hamilton's convention, scalar first. Conversions from and to angles are in
+//! [`rotation`](super::rotation).
 
 use super::Vec3;
 use core::ops::{Mul, MulAssign, Neg};
 
-/// An attitude, body → world: a quaternion of length one. It turns a body vector into the world's with `attitude * vector`,
-/// and back with [`inverse_transform_vector`](Self::inverse_transform_vector).
+/// An attitude: a unit quaternion that turns body vectors into world vectors with
+/// `attitude * vector`, and back with [`inverse_transform_vector`](Self::inverse_transform_vector).
 ///
 /// ```
 /// use stampfly_types::{Quat, Vec3};
@@ -26,7 +27,7 @@ pub struct Quat {
     z: f32,
 }
 
-/// Four numbers whose squares do not add up to one within 2 %: no attitude.
+/// The squares of the four numbers do not add up to one within 2 %, so they are not an attitude.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotUnit;
 
@@ -38,75 +39,78 @@ impl core::fmt::Display for NotUnit {
 
 impl core::error::Error for NotUnit {}
 
-/// How far the squared length of a stored quaternion may be from one: 1 % of the length. Rounding makes 10⁻⁶ of it.
+/// Tolerance of the squared length of a stored quaternion: 1 % of the length. Rounding errors are
+/// 10⁻⁶.
 const UNIT: f32 = 0.02;
 
 impl Quat {
-    /// No turn: level, nose to the north.
+    /// No rotation: level, nose to the north.
     #[inline]
     #[must_use]
     pub const fn identity() -> Self {
         Self::new_unchecked(1.0, 0.0, 0.0, 0.0)
     }
 
-    /// Of a scalar and a vector part whose length is known to be one. With another length it also scales what it turns; whoever
-    /// gets numbers from outside takes `try_from`.
+    /// Makes a quaternion from its scalar and its vector part without a check of the length, which
+    /// must be one. With another length it also scales the vectors it turns. Use `try_from` for
+    /// numbers from outside.
     #[inline]
     #[must_use]
     pub const fn new_unchecked(w: f32, x: f32, y: f32, z: f32) -> Self {
         Self { w, x, y, z }
     }
 
-    /// Scalar, then vector part.
+    /// The scalar, then the vector part.
     #[inline]
     #[must_use]
     pub const fn wxyz(&self) -> [f32; 4] {
         [self.w, self.x, self.y, self.z]
     }
 
-    /// The vector part: the axis of the turn, as long as the sine of half its angle.
+    /// The vector part: the axis of the rotation times the sine of half its angle.
     #[inline]
     #[must_use]
     pub const fn imag(&self) -> Vec3 {
         Vec3::new(self.x, self.y, self.z)
     }
 
-    /// The turn back.
+    /// The reverse rotation.
     #[inline]
     #[must_use]
     pub const fn inverse(&self) -> Self {
         Self::new_unchecked(self.w, -self.x, -self.y, -self.z)
     }
 
-    /// The square of its length: one, but for rounding.
+    /// The square of the length: one, apart from rounding.
     #[inline]
     #[must_use]
     pub const fn norm_squared(&self) -> f32 {
         (self.x * self.x + self.z * self.z) + (self.y * self.y + self.w * self.w)
     }
 
-    /// Is every number finite and the length one, within 1 %?
+    /// Whether all numbers are finite and the length is one within 1 %.
     #[inline]
     #[must_use]
     pub fn is_unit(&self) -> bool {
+        // False for NaN, too, since every comparison with NaN is.
         (self.norm_squared() - 1.0).abs() < UNIT
     }
 
-    /// A body vector in the world's axes; the same as `self * vector`.
+    /// Turns a body vector into the world frame; equal to `self * vector`.
     #[inline]
     #[must_use]
     pub fn transform_vector(&self, vector: &Vec3) -> Vec3 {
         *self * *vector
     }
 
-    /// A world vector in the body's axes.
+    /// Turns a world vector into the body frame.
     #[inline]
     #[must_use]
     pub fn inverse_transform_vector(&self, vector: &Vec3) -> Vec3 {
         self.inverse() * *vector
     }
 
-    /// The rotation matrix, row by row: the columns are the body's axes in the world's.
+    /// The rotation matrix, row by row. Its columns are the body's axes in the world frame.
     #[inline]
     #[must_use]
     pub const fn to_matrix(&self) -> [[f32; 3]; 3] {
@@ -128,8 +132,8 @@ impl Default for Quat {
     }
 }
 
-/// From scalar and vector part, when their length is one within 1 %. They are taken as they are: what was stored comes back to
-/// the last bit.
+/// Accepts scalar and vector part when the length is one within 1 %. The numbers are stored
+/// unchanged, so an attitude from a log is identical to the last bit.
 impl TryFrom<[f32; 4]> for Quat {
     type Error = NotUnit;
 
@@ -158,7 +162,7 @@ impl Neg for Quat {
     }
 }
 
-// First the right one, then the left one.
+// Composition: the rotation on the right is applied first.
 operator!(Mul, mul, Quat, Quat, Quat, |first, second| {
     let ([aw, ax, ay, az], [bw, bx, by, bz]) = (first.wxyz(), second.wxyz());
     Quat::new_unchecked(
@@ -169,7 +173,7 @@ operator!(Mul, mul, Quat, Quat, Quat, |first, second| {
     )
 });
 
-// A vector v turned: v + 2·w·(u × v) + 2·u × (u × v), with the scalar w and the vector part u.
+// The rotated vector v + 2·w·(u × v) + 2·u × (u × v), with the scalar w and the vector part u.
 operator!(Mul, mul, Quat, Vec3, Vec3, |quaternion, vector| {
     let axis = quaternion.imag();
     let twice = axis.cross(&vector) * 2.0;

@@ -1,11 +1,13 @@
-//! Attitudes from angles, and angles from attitudes: what needs sines and arc tangents.
+//! Conversions between attitudes and angles, which need trigonometric functions.
 //!
-//! Roll, pitch and yaw are for people and plots; what controls takes an axis and an angle, or the quaternion itself.
+//! Roll, pitch and yaw are for people and plots. Control laws use axis and angle, or the quaternion
+//! itself.
 
 use super::{Quat, Vec3};
 use crate::math;
 
-/// Square of half an angle, rad², below which a rotation is none: its sine divided by it would be a division by nothing.
+/// Square of half an angle, rad², up to which the rotation counts as the identity, to avoid a
+/// division by zero.
 const NO_TURN: f32 = f32::EPSILON * f32::EPSILON;
 
 impl Quat {
@@ -23,7 +25,7 @@ impl Quat {
         )
     }
 
-    /// A turn by `angle`, radians, about an axis of length one.
+    /// A rotation by `angle`, radians, about an axis of length one.
     #[must_use]
     pub fn from_axis_angle(axis: &Vec3, angle: f32) -> Self {
         let (sin, cos) = math::sin_cos(angle * 0.5);
@@ -31,7 +33,8 @@ impl Quat {
         Self::new_unchecked(cos, x, y, z)
     }
 
-    /// A turn about the direction of a vector by its length, radians: what a rate does in a time is `rate * dt`.
+    /// A rotation about the direction of `turn` by its length, radians. For an angular rate over a
+    /// time step pass `rate * dt`.
     ///
     /// ```
     /// use stampfly_types::{Quat, Vec3};
@@ -40,6 +43,8 @@ impl Quat {
     /// ```
     #[must_use]
     pub fn from_scaled_axis(turn: Vec3) -> Self {
+        // With the angle θ = |turn| and the axis n = turn/θ the quaternion is
+        // (cos(θ/2), n·sin(θ/2)).
         let half = turn / 2.0;
         let square = half.norm_squared();
         if square <= NO_TURN {
@@ -50,7 +55,7 @@ impl Quat {
         Self::new_unchecked(math::cos(angle), x, y, z)
     }
 
-    /// Axis times angle, radians, the shorter way round; zero for no turn.
+    /// Axis times angle, radians, with an angle of at most π; zero for the identity.
     #[must_use]
     pub fn scaled_axis(&self) -> Vec3 {
         let ([w, ..], vector) = (self.wxyz(), self.imag());
@@ -58,24 +63,26 @@ impl Quat {
         if length <= 0.0 {
             return Vec3::zeros();
         }
+        // q and −q are the same attitude; a negative scalar would be an angle above π.
         let axis = if w >= 0.0 { vector } else { -vector } / length;
         axis * self.angle()
     }
 
-    /// The angle it turns by, radians, 0 to π.
+    /// Angle of the rotation, radians, 0 to π.
     #[must_use]
     pub fn angle(&self) -> f32 {
         let [w, ..] = self.wxyz();
+        // From both parts, because the arc cosine of w alone is inaccurate near zero.
         math::atan2(self.imag().norm(), w.abs()) * 2.0
     }
 
-    /// The angle between two attitudes, radians, 0 to π.
+    /// Angle of the rotation between two attitudes, radians, 0 to π.
     #[must_use]
     pub fn angle_to(&self, other: &Self) -> f32 {
         (*other * self.inverse()).angle()
     }
 
-    /// The same attitude with the length that rounding took from it. Of four zeros it makes numbers that are none.
+    /// The same attitude with length one, after rounding has changed it. Four zeros give NaN.
     #[must_use]
     pub fn normalize(&self) -> Self {
         let length = math::sqrt(self.norm_squared());

@@ -1,14 +1,14 @@
-//! Three numbers that belong together: a velocity, a field, three angles.
+//! Three-dimensional vectors.
 //!
-//! A value for messages, and for the arithmetic of a flight controller: sums, multiples, lengths, dot and cross products,
-//! with the names nalgebra gives them. It is no linear algebra: for matrices take nalgebra's types, into which it converts
-//! with the feature `nalgebra`.
+//! For messages and for the arithmetic of a flight controller: sums, multiples, lengths, dot and
+//! cross products, named as in nalgebra. For matrices use nalgebra's types, into which [`Vec3`]
+//! converts with the feature `nalgebra`.
 
 use crate::comparison::{larger, smaller};
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A vector of three `f32`. The frame and unit are part of the name or the documentation of whoever holds it.
+/// A vector of three `f32`. The field or variable that holds it documents its frame and unit.
 ///
 /// ```
 /// use stampfly_types::Vec3;
@@ -22,147 +22,147 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign,
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "[f32; 3]", into = "[f32; 3]"))]
 pub struct Vec3 {
-    /// Forward in the body's frame, north in the world's.
+    /// Forward in the body frame, north in the world frame.
     pub x: f32,
-    /// Right in the body's frame, east in the world's.
+    /// Right in the body frame, east in the world frame.
     pub y: f32,
-    /// Down.
+    /// Down in both frames.
     pub z: f32,
 }
 
 impl Vec3 {
-    /// Of its three numbers.
+    /// A vector from its components.
     #[inline]
     #[must_use]
     pub const fn new(x: f32, y: f32, z: f32) -> Self {
         Self { x, y, z }
     }
 
-    /// Zero.
+    /// The zero vector.
     #[inline]
     #[must_use]
     pub const fn zeros() -> Self {
         Self::new(0.0, 0.0, 0.0)
     }
 
-    /// The same number three times.
+    /// A vector with three equal components.
     #[inline]
     #[must_use]
     pub const fn repeat(value: f32) -> Self {
         Self::new(value, value, value)
     }
 
-    /// One along x.
+    /// The unit vector along x.
     #[inline]
     #[must_use]
     pub const fn x() -> Self {
         Self::new(1.0, 0.0, 0.0)
     }
 
-    /// One along y.
+    /// The unit vector along y.
     #[inline]
     #[must_use]
     pub const fn y() -> Self {
         Self::new(0.0, 1.0, 0.0)
     }
 
-    /// One along z.
+    /// The unit vector along z.
     #[inline]
     #[must_use]
     pub const fn z() -> Self {
         Self::new(0.0, 0.0, 1.0)
     }
 
-    /// Each number from its axis, 0 to 2.
+    /// A vector from a function of the axis, 0 to 2.
     #[inline]
     #[must_use]
     pub fn from_fn(mut number: impl FnMut(usize) -> f32) -> Self {
         Self::new(number(0), number(1), number(2))
     }
 
-    /// The three numbers.
+    /// The components as an array.
     #[inline]
     #[must_use]
     pub const fn to_array(self) -> [f32; 3] {
         [self.x, self.y, self.z]
     }
 
-    /// x, y and z in turn.
+    /// Iterates over x, y and z.
     #[inline]
     pub fn iter(&self) -> core::array::IntoIter<&f32, 3> {
         [&self.x, &self.y, &self.z].into_iter()
     }
 
-    /// x, y and z in turn, to change them.
+    /// Iterates mutably over x, y and z.
     #[inline]
     pub fn iter_mut(&mut self) -> core::array::IntoIter<&mut f32, 3> {
         [&mut self.x, &mut self.y, &mut self.z].into_iter()
     }
 
-    /// A function of each number.
+    /// Applies a function to each component.
     #[inline]
     #[must_use]
     pub fn map(&self, mut function: impl FnMut(f32) -> f32) -> Self {
         Self::new(function(self.x), function(self.y), function(self.z))
     }
 
-    /// A function of each number and the one of `other` beside it.
+    /// Applies a function to each pair of components of the two vectors.
     #[inline]
     #[must_use]
     pub fn zip_map(&self, other: &Self, mut function: impl FnMut(f32, f32) -> f32) -> Self {
         Self::new(function(self.x, other.x), function(self.y, other.y), function(self.z, other.z))
     }
 
-    /// Each number times the one of `other` beside it.
+    /// Product of the two vectors, component by component.
     #[inline]
     #[must_use]
     pub fn component_mul(&self, other: &Self) -> Self {
         Self::new(self.x * other.x, self.y * other.y, self.z * other.z)
     }
 
-    /// Each number divided by the one of `other` beside it.
+    /// Quotient of the two vectors, component by component.
     #[inline]
     #[must_use]
     pub fn component_div(&self, other: &Self) -> Self {
         Self::new(self.x / other.x, self.y / other.y, self.z / other.z)
     }
 
-    /// Each number without its sign.
+    /// Absolute value of each component.
     #[inline]
     #[must_use]
     pub fn abs(&self) -> Self {
         Self::new(self.x.abs(), self.y.abs(), self.z.abs())
     }
 
-    /// The largest of the numbers. One that is no number is passed over.
+    /// The largest component. Ignores NaN.
     #[inline]
     #[must_use]
     pub const fn max(&self) -> f32 {
         larger(larger(self.x, self.y), self.z)
     }
 
-    /// The smallest of the numbers. One that is no number is passed over.
+    /// The smallest component. Ignores NaN.
     #[inline]
     #[must_use]
     pub const fn min(&self) -> f32 {
         smaller(smaller(self.x, self.y), self.z)
     }
 
-    /// The largest of the numbers without their signs. One that is no number is passed over.
+    /// The largest absolute value of a component. Ignores NaN.
     #[inline]
     #[must_use]
     pub const fn amax(&self) -> f32 {
         larger(larger(self.x.abs(), self.y.abs()), self.z.abs())
     }
 
-    /// The larger of each two numbers.
+    /// The larger of the two vectors, component by component.
     #[inline]
     #[must_use]
     pub fn sup(&self, other: &Self) -> Self {
         self.zip_map(other, f32::max)
     }
 
-    /// The smaller of each two numbers.
+    /// The smaller of the two vectors, component by component.
     #[inline]
     #[must_use]
     pub fn inf(&self, other: &Self) -> Self {
@@ -176,7 +176,7 @@ impl Vec3 {
         self.x + self.y + self.z
     }
 
-    /// The same vector without its z: of a velocity in the world's frame, the one over ground.
+    /// The vector with z set to zero. Of a velocity in the world frame: the velocity over ground.
     #[inline]
     #[must_use]
     pub const fn horizontal(&self) -> Self {
@@ -201,7 +201,7 @@ impl Vec3 {
         )
     }
 
-    /// Square of the length: what to compare with a squared limit, because it takes no root.
+    /// Square of the length. Use it for comparisons with a squared limit, because it needs no root.
     #[inline]
     #[must_use]
     pub const fn norm_squared(&self) -> f32 {
@@ -216,7 +216,8 @@ impl Vec3 {
         crate::math::sqrt(self.norm_squared())
     }
 
-    /// The same direction with length one. That of zero is no number: ask for the [`norm`](Self::norm) first.
+    /// The vector scaled to length one. NaN for the zero vector: check the [`norm`](Self::norm)
+    /// first.
     #[cfg(feature = "math")]
     #[inline]
     #[must_use]
@@ -249,7 +250,7 @@ impl<'a> IntoIterator for &'a Vec3 {
     }
 }
 
-/// An axis other than 0, 1 and 2 panics, as with an array.
+/// Panics for an axis other than 0, 1 and 2, like an array.
 impl Index<usize> for Vec3 {
     type Output = f32;
 
@@ -259,7 +260,7 @@ impl Index<usize> for Vec3 {
     }
 }
 
-/// An axis other than 0, 1 and 2 panics, as with an array.
+/// Panics for an axis other than 0, 1 and 2, like an array.
 impl IndexMut<usize> for Vec3 {
     #[inline]
     fn index_mut(&mut self, axis: usize) -> &mut f32 {
@@ -279,7 +280,7 @@ operator!(Mul, mul, Vec3, f32, Vec3, |a, b| Vec3::new(a.x * b, a.y * b, a.z * b)
 operator!(Mul, mul, f32, Vec3, Vec3, |a, b| b * a);
 operator!(Div, div, Vec3, f32, Vec3, |a, b| Vec3::new(a.x / b, a.y / b, a.z / b));
 
-/// An operation that changes its left side.
+/// Implements an assignment operator.
 macro_rules! assignment {
     ($Trait:ident, $function:ident, $Right:ty, $operator:tt) => {
         impl $Trait<$Right> for Vec3 {
@@ -318,7 +319,7 @@ impl Neg for &Vec3 {
     }
 }
 
-/// As (x, y, z), each number in the format asked for.
+/// Writes (x, y, z) with the formatter's options applied to each component.
 impl core::fmt::Display for Vec3 {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("(")?;

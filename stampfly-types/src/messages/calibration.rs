@@ -1,105 +1,107 @@
-//! Calibration that a person asks for: what is asked, and how far it is.
+//! Messages of calibrations that an operator starts: requests and progress.
 //!
-//! Not the still-calibration after power-on, which nobody asks for: that is [`CalibrationResult`](super::CalibrationResult).
+//! Not for the calibration at rest after power-on, which starts by itself: see
+//! [`CalibrationResult`](super::CalibrationResult).
 
 use crate::{message, message_enum};
 
 message_enum! {
-    /// What can be calibrated by somebody who holds the vehicle.
+    /// A calibration for which an operator handles the vehicle.
     pub enum CalibrationKind {
-        /// Nothing; as a request, the end of what is under way.
+        /// None; in a request: end the calibration in progress.
         #[default]
         None = 0,
         /// Tilt of the inertial sensor in the airframe: standing on a level floor.
         Level = 1,
-        /// Accelerometer bias and scale: lying on each of its six faces.
+        /// Accelerometer bias and scale: resting on each of its six faces.
         SixPositions = 2,
-        /// Hard and soft iron of the magnetometer: turned every way.
+        /// Hard and soft iron of the magnetometer: turned through all attitudes.
         Magnetometer = 3,
-        /// Drift of gyro and accelerometer with temperature: lying still while it warms up.
+        /// Drift of gyro and accelerometer with temperature: at rest while it warms up.
         Temperature = 4,
     }
 }
 
 message_enum! {
-    /// Where a calibration is.
+    /// Progress of a calibration.
     pub enum CalibrationStage {
-        /// None was asked for.
+        /// No calibration was requested.
         #[default]
         Idle = 0,
-        /// Under way.
+        /// In progress.
         Running = 1,
-        /// There is a result.
+        /// Finished with a result.
         Done = 2,
-        /// It ended without one: cancelled by whoever had asked for it.
+        /// Ended without a result: cancelled by a request.
         Cancelled = 3,
-        /// It ended without one: the vehicle was armed.
+        /// Ended without a result: the vehicle was armed.
         Armed = 4,
-        /// It ended without one: it took too long.
+        /// Ended without a result: it took too long.
         TimedOut = 5,
-        /// It ended without one: what was measured is no sensor's.
+        /// Ended without a result: the measurements are implausible for this sensor.
         Implausible = 6,
     }
 }
 
 message_enum! {
-    /// What whoever holds the vehicle should do now, and why.
+    /// Instruction for the operator, and its reason.
     pub enum CalibrationHint {
         /// Nothing.
         #[default]
         None = 0,
-        /// Leave it alone: it moves.
+        /// Keep the vehicle still: it moves.
         Moving = 1,
-        /// Leave it alone: it is being measured.
+        /// Keep the vehicle still: it is being measured.
         Measuring = 2,
-        /// Turn it to another face that is missing.
+        /// Turn the vehicle to a face that is still missing.
         Turn = 3,
-        /// It lies on no face: it leans by more than 25°.
+        /// The vehicle does not rest on a face: it leans by more than 25°.
         NoFace = 4,
-        /// This hold contradicts an earlier one of the same face.
+        /// This measurement contradicts an earlier one of the same face.
         Contradiction = 5,
-        /// It does not stand level: it is tilted by more than 5°.
+        /// The vehicle is not level: it is tilted by more than 5°.
         Tilted = 6,
-        /// Turn it on, through every attitude: directions are missing.
+        /// Continue to turn the vehicle through all attitudes: directions are missing.
         Directions = 7,
-        /// Stay away from iron: the field changes with the place.
+        /// Move away from iron: the field changes with the position.
         Disturbed = 8,
-        /// Leave it alone until it is warmer.
+        /// Keep the vehicle still until it is warmer.
         Warming = 9,
-        /// The sensor gives no temperature.
+        /// The sensor provides no temperature.
         NoTemperature = 10,
-        /// The field is too weak or too strong for that of the earth.
+        /// The field is weaker or stronger than the Earth's.
         Strength = 11,
     }
 }
 
 message! {
-    /// Begin a calibration, or end the one that is under way.
+    /// Start a calibration, or end the one in progress.
     pub struct CalibrationRequest {
-        /// Which.
+        /// The calibration to start.
         kind: CalibrationKind,
     }
 }
 
 message! {
-    /// How far a calibration is, and what it has found.
+    /// Progress and result of a calibration.
     pub struct CalibrationReport {
-        /// Which.
+        /// The calibration it reports on.
         kind: CalibrationKind,
-        /// Where it is.
+        /// Progress as a stage.
         stage: CalibrationStage,
-        /// What to do now.
+        /// Next step of the operator.
         hint: CalibrationHint,
-        /// How much of it is done, 0 to 1.
+        /// Completed share, 0 to 1.
         progress: f32,
-        /// Faces that have been held, by bits: nose, tail, right, left, bottom and top down.
+        /// Faces that have been measured, one bit each from bit 0: nose, tail, right, left, bottom
+        /// and top down.
         faces: u32,
-        /// What the sensor was off by before: m/s² for six positions, rad for the level, a share of the field for the
-        /// magnetometer, rad/s for temperature.
+        /// Error of the sensor before the calibration: m/s² for six positions, rad for the level, a
+        /// share of the field for the magnetometer, rad/s for temperature.
         before: f32 ["SI"],
-        /// What remains, in the same unit.
+        /// Error that remains after the calibration, in the same unit.
         residual: f32 ["SI"],
-        /// What was found, in the order of the parameters; zero behind the last.
+        /// Calibration values, in the order of the parameters; unused entries are zero.
         values: [f32; 9] ["SI"],
     }
 }

@@ -1,13 +1,14 @@
-//! What people and programs ask for, on its way from raw input to set-point.
+//! Commands of pilots and programs, from raw input to set-point.
 //!
-//! [`PilotInput`] and [`GuidedCommand`] come from links, [`ButtonEvent`] from the board's button. Arbitration
-//! turns them into one [`CommandSetpoint`]; the navigator turns goals into a jerk-limited [`Setpoint`].
+//! [`PilotInput`] and [`GuidedCommand`] come from links, [`ButtonEvent`] from the board's button.
+//! Arbitration turns them into one [`CommandSetpoint`]; the navigator turns goals into a
+//! jerk-limited [`Setpoint`].
 
 use super::system::{CommandSource, FlightMode};
 use crate::{Vec3, message, message_enum, message_flags};
 
 message! {
-    /// One authenticated frame of a pilot's transmitter, normalised. Right and up are positive.
+    /// One authenticated frame of a pilot's transmitter, normalised.
     pub struct PilotInput {
         /// Roll stick, −1 to 1, right positive.
         roll: f32,
@@ -15,19 +16,20 @@ message! {
         pitch: f32,
         /// Yaw stick, −1 to 1, clockwise seen from above positive.
         yaw: f32,
-        /// Throttle stick, −1 to 1, spring centred: zero holds height in the modes that hold it.
+        /// Throttle stick, −1 to 1, up positive, spring centred: zero holds height in the modes
+        /// that hold it.
         throttle: f32,
         /// The flight mode the switches select.
         mode: FlightMode,
-        /// Arm switch. Arming needs a rising edge seen by the vehicle.
+        /// Arm switch. Arming needs a rising edge that the vehicle has seen.
         arm: bool,
-        /// Emergency stop: motors off now, whatever the state.
+        /// Emergency stop: motors off now, in every state.
         kill: bool,
     }
 }
 
-/// A stick as it may be used: within ±1, and centred when it is no number. Call it before using a stick: a radio, a program or a
-/// log may have sent anything.
+/// A stick deflection limited to ±1; zero when it is not finite. Call it before using a stick,
+/// because a radio, a program or a log may contain any value.
 ///
 /// ```
 /// use stampfly_types::messages::stick;
@@ -39,7 +41,7 @@ pub fn stick(deflection: f32) -> f32 {
 }
 
 impl PilotInput {
-    /// The same frame with sticks that may be used, see [`stick`].
+    /// The same frame with every stick passed through [`stick`].
     ///
     /// ```
     /// use stampfly_types::messages::PilotInput;
@@ -57,8 +59,8 @@ impl PilotInput {
         }
     }
 
-    /// Are all sticks numbers? Where one is none, a frame says nothing about what the pilot wants but for its switches: no value
-    /// that it could be taken for is safe in every flight mode.
+    /// Whether all sticks are finite. If one is not, only the switches of the frame are usable: no
+    /// substitute for the stick is safe in every flight mode.
     #[must_use]
     pub fn is_readable(&self) -> bool {
         [self.roll, self.pitch, self.yaw, self.throttle].iter().all(|stick| stick.is_finite())
@@ -66,44 +68,44 @@ impl PilotInput {
 }
 
 message_enum! {
-    /// What a guided command asks for.
+    /// Kind of a guided command.
     pub enum GuidedKind {
         /// Nothing.
         #[default]
         None = 0,
-        /// Allow the motors.
+        /// Allow the motors to turn.
         Arm = 1,
         /// Land if flying, then stop the motors.
         Disarm = 2,
-        /// Rise to `position.z` (negative is up) above the present place.
+        /// Climb to `position.z` (negative is up) above the present position.
         TakeOff = 3,
         /// Append a way-point to the route.
         WayPoint = 4,
-        /// Forget the route and stay here.
+        /// Delete the route and hold the present position.
         Hold = 5,
-        /// Land here.
+        /// Land at the present position.
         Land = 6,
         /// Motors off now.
         Kill = 7,
-        /// Turn over once to the left.
+        /// Flip once to the left.
         FlipLeft = 8,
-        /// Turn over once to the right.
+        /// Flip once to the right.
         FlipRight = 9,
-        /// Turn over once forward, nose down.
+        /// Flip once forward, nose down.
         FlipForward = 10,
-        /// Turn over once backward, nose up.
+        /// Flip once backward, nose up.
         FlipBack = 11,
-        /// Tune the roll rate loop, from a hover; any other command ends it.
+        /// Tune the roll rate loop, from a hover. Any other command ends the tuning.
         AutotuneRoll = 12,
-        /// Tune the pitch rate loop.
+        /// Tune the pitch rate loop, as above.
         AutotunePitch = 13,
-        /// Tune the yaw rate loop.
+        /// Tune the yaw rate loop, as above.
         AutotuneYaw = 14,
     }
 }
 
 message_enum! {
-    /// Which way a vehicle turns over.
+    /// Direction of a flip.
     pub enum FlipDirection {
         /// Left wing down: negative roll.
         #[default]
@@ -118,7 +120,7 @@ message_enum! {
 }
 
 impl GuidedKind {
-    /// The flip that is asked for, if one is.
+    /// Direction of the flip, when the command is a flip.
     ///
     /// ```
     /// use stampfly_types::messages::{FlipDirection, GuidedKind};
@@ -148,28 +150,28 @@ impl GuidedKind {
 }
 
 message! {
-    /// A command from a program: the ground station, a mission file, a script.
+    /// A command of a program: a ground station, a mission file, a script.
     pub struct GuidedCommand {
-        /// What is asked.
+        /// Kind of the command.
         kind: GuidedKind,
         /// Goal in the world frame, relative to the origin.
         position: Vec3 ["m"],
         /// Goal heading.
         yaw: f32 ["rad"],
-        /// Highest speed on the way; zero asks for the default.
+        /// Highest speed on the way; zero selects the default.
         speed: f32 ["m/s"],
-        /// Time to stay at the goal before going on.
+        /// Time to stay at the goal before the next way-point.
         dwell: f32 ["s"],
     }
 }
 
 message_enum! {
-    /// What the button did.
+    /// Gesture on the button.
     pub enum ButtonGesture {
         /// Nothing.
         #[default]
         None = 0,
-        /// Pressed and let go.
+        /// Pressed and released.
         Click = 1,
         /// Two clicks within the double-click time.
         DoubleClick = 2,
@@ -177,25 +179,25 @@ message_enum! {
         HoldPair = 3,
         /// Held for five seconds: restart.
         HoldReset = 4,
-        /// Pressed just now; another gesture follows when it is clear what this press is.
+        /// Pressed just now. A further event follows once the gesture is known.
         Press = 5,
     }
 }
 
 message! {
-    /// What happened on the board's button: every press at once, and what became of it.
+    /// Event of the board's button: one at every press, and one for the gesture it became.
     pub struct ButtonEvent {
-        /// What happened.
+        /// Kind of the event.
         gesture: ButtonGesture,
-        /// How long the button has been down, or was.
+        /// Time for which the button is, or was, pressed.
         held: f32 ["s"],
     }
 }
 
 message! {
-    /// The arbitrated command: one authority, sticks normalised, dead band applied.
+    /// The arbitrated command: from one source, with normalised sticks and the dead band applied.
     pub struct CommandSetpoint {
-        /// −1 to 1; meaning depends on the flight mode.
+        /// −1 to 1. The flight mode defines its meaning.
         throttle: f32,
         /// −1 to 1, right positive.
         roll: f32,
@@ -203,13 +205,13 @@ message! {
         pitch: f32,
         /// −1 to 1, clockwise positive.
         yaw: f32,
-        /// Whose command it is.
+        /// Source of the command.
         source: CommandSource,
     }
 }
 
 message_flags! {
-    /// Which parts of a set-point are commanded.
+    /// The commanded parts of a set-point.
     pub struct SetpointAxes {
         /// North and east position, with velocity and acceleration as feed-forward.
         POSITION_XY = 0,
@@ -248,7 +250,7 @@ impl SetpointAxes {
         (Self::FLIP_BACK, FlipDirection::Back),
     ];
 
-    /// Turn over once this way.
+    /// The set-point of a flip in this direction.
     ///
     /// ```
     /// use stampfly_types::messages::{FlipDirection, SetpointAxes};
@@ -265,7 +267,7 @@ impl SetpointAxes {
         }
     }
 
-    /// Which way to turn over, if that is asked for.
+    /// Direction of the flip, when one is commanded.
     #[must_use]
     pub fn flip(self) -> Option<FlipDirection> {
         Self::FLIPS.iter().find(|(flag, _)| self.contains(*flag)).map(|(_, direction)| *direction)
@@ -273,23 +275,23 @@ impl SetpointAxes {
 }
 
 message! {
-    /// Where the vehicle should be right now: a point on a jerk-limited path.
+    /// Present target of the vehicle: a point on a jerk-limited path.
     pub struct Setpoint {
-        /// World NED.
+        /// Position, world NED.
         position: Vec3 ["m"],
-        /// World NED.
+        /// Velocity, world NED.
         velocity: Vec3 ["m/s"],
-        /// World NED.
+        /// Acceleration, world NED.
         acceleration: Vec3 ["m/s^2"],
         /// Heading.
         yaw: f32 ["rad"],
         /// Heading rate.
         yaw_rate: f32 ["rad/s"],
-        /// Which of the above are commanded.
+        /// The quantities above that are commanded.
         axes: SetpointAxes,
-        /// Way-points still ahead, the present one included.
+        /// Number of way-points ahead, the present one included.
         remaining: u32,
-        /// Has the last way-point been reached and its dwell time passed?
+        /// Whether the last way-point has been reached and its dwell time has passed.
         arrived: bool,
     }
 }

@@ -1,37 +1,38 @@
-//! What the controller wants and what the motors get.
+//! Outputs of the controller and commands to motors and servos.
 
 use crate::{Vec3, message};
 
-/// The largest number of motors a message can carry.
+/// Maximum number of motors in a message.
 pub const MAX_MOTORS: usize = 8;
 
 message! {
-    /// Force and torque the controller asks of the airframe.
+    /// Force and torque demanded of the airframe.
     pub struct ControlOutput {
-        /// Collective thrust along −z of the body.
+        /// Collective thrust along the body's −z axis.
         thrust: f32 ["N"],
-        /// Torque about the body axes.
+        /// Torque about the body axes, FRD.
         torque: Vec3 ["N*m"],
     }
 }
 
 message! {
-    /// What is sent to the motors.
+    /// Command to the motors.
     pub struct MotorOutput {
-        /// Duty cycle per motor, 0 to 1. The StampFly's order: front right, rear right, rear left, front left.
+        /// Duty cycle per motor, 0 to 1. Order on the StampFly: front right, rear right, rear left,
+        /// front left.
         duty: [f32; MAX_MOTORS],
-        /// How many of them exist.
+        /// Number of motors in use.
         count: u8,
-        /// May the motors turn? When not, every duty is exactly zero.
+        /// Whether the motors may turn. If not, every duty is exactly zero.
         armed: bool,
-        /// Share of the torque demand that could not be met, 0 is none: roll, pitch, yaw, thrust.
+        /// Share of the demand that the motors cannot deliver, 0 to 1: roll, pitch, yaw, thrust.
         unmet: [f32; 4],
     }
 }
 
 impl MotorOutput {
-    /// The share that was met, from 0 to 1, where this one was [unmet](Self::unmet). A number that
-    /// is not a share counts as none: the whole demand was met.
+    /// The delivered share, 0 to 1, for an [unmet](Self::unmet) share. A negative number or NaN
+    /// counts as zero unmet.
     ///
     /// ```
     /// use stampfly_types::messages::MotorOutput;
@@ -49,15 +50,16 @@ impl MotorOutput {
     }
 }
 
-/// The largest number of servos a message can carry.
+/// Maximum number of servos in a message.
 pub const MAX_SERVOS: usize = 8;
 
 message! {
-    /// What is sent to the servos of control surfaces.
+    /// Command to the servos of control surfaces.
     pub struct ServoOutput {
-        /// Deflection per servo as a share of the largest, −1 to 1; a positive one is trailing edge down, for a fin trailing edge left.
+        /// Deflection per servo as a share of the largest, −1 to 1. Positive is trailing edge down;
+        /// for a fin, trailing edge left.
         deflection: [f32; MAX_SERVOS],
-        /// How many of them exist.
+        /// Number of servos in use.
         count: u8,
     }
 }

@@ -1,9 +1,9 @@
-//! What the estimator knows, and how well.
+//! Output of the estimator and its uncertainty.
 
 use crate::{Quat, Vec3, message, message_flags};
 
 message_flags! {
-    /// Which outputs of an estimate may be used. A cleared bit means the number beside it is a placeholder.
+    /// Outputs of an estimate that may be used. Values whose bit is cleared are placeholders.
     pub struct Validity {
         /// Roll and pitch.
         TILT = 0,
@@ -23,7 +23,7 @@ message_flags! {
 }
 
 message_flags! {
-    /// A set of sensors: the ones that took part, or the ones that were refused.
+    /// A set of sensors: those that were used, or those that were rejected.
     pub struct SensorMask {
         /// Inertial measurement unit.
         IMU = 0,
@@ -45,17 +45,17 @@ message_flags! {
 }
 
 message! {
-    /// The vehicle's state as the estimator sees it.
+    /// The estimated state of the vehicle.
     pub struct StateEstimate {
-        /// Body FRD → world NED.
+        /// Attitude, body FRD → world NED.
         attitude: Quat,
-        /// World NED, origin where the vehicle was initialised.
+        /// Position, world NED. The origin is where the estimator was initialised.
         position: Vec3 ["m"],
-        /// World NED.
+        /// Velocity, world NED.
         velocity: Vec3 ["m/s"],
-        /// Body FRD, bias removed.
+        /// Angular rate, body FRD, bias removed.
         angular_rate: Vec3 ["rad/s"],
-        /// Body FRD, bias removed. Level and still: (0, 0, −9.81).
+        /// Specific force, body FRD, bias removed. Level and at rest: (0, 0, −9.81).
         specific_force: Vec3 ["m/s^2"],
         /// Gyro bias, body FRD.
         gyro_bias: Vec3 ["rad/s"],
@@ -63,19 +63,20 @@ message! {
         accel_bias: Vec3 ["m/s^2"],
         /// Height of the body above the surface below.
         height: f32 ["m"],
-        /// One standard deviation of the horizontal position, root of the trace.
+        /// One standard deviation of the horizontal position: root of the trace of its covariance.
         position_std_xy: f32 ["m"],
-        /// Which of the above may be used.
+        /// The quantities above that may be used.
         valid: Validity,
-        /// Sensors that took part within the last second.
+        /// Sensors that were used within the last second.
         sensors: SensorMask,
     }
 }
 
 message! {
-    /// How the estimator got on with its sensors: one number per measurement, for plots and failsafe.
+    /// Innovations, test ratios and counters of the estimator, for plots and failsafe.
     ///
-    /// A test ratio is innovation² / (gate² · variance): above one the measurement was refused.
+    /// A test ratio is innovation² / (gate² · variance). A measurement with a ratio above one is
+    /// rejected.
     pub struct EstimatorStatus {
         /// Innovation of the last range, along the vertical.
         tof_innovation: f32 ["m"],
@@ -93,85 +94,88 @@ message! {
         mag_innovation: f32 ["rad"],
         /// Test ratio of the last magnetic heading.
         mag_ratio: f32,
-        /// Angle between measured and predicted gravity.
+        /// Innovation of the accelerometer attitude: angle between measured and predicted gravity.
         accel_innovation: f32 ["rad"],
         /// Test ratio of the last accelerometer attitude.
         accel_ratio: f32,
-        /// Measurements refused since the start: range, flow, baro, mag, accelerometer.
+        /// Measurements rejected since the start: range, flow, baro, mag, accelerometer.
         refused: [u32; 5],
         /// Measurements offered since the start, in the same order.
         offered: [u32; 5],
-        /// Ranges and flow that were compared with the estimate, used or not, in the same order; zero for
-        /// the others and for an estimator that does not count them.
+        /// Number of ranges and flow samples compared with the estimate, used or not, in the same
+        /// order. Zero for the other sensors, and for an estimator that does not count them.
         tested: [u32; 5],
-        /// Inertial samples refused since the start: not finite, or garbage that was bridged.
+        /// Inertial samples rejected since the start: not finite, or garbage that was bridged.
         imu_refused: u32,
-        /// Resets since the start.
+        /// Number of resets since the start.
         resets: u32,
-        /// One standard deviation of the horizontal acceleration that tilt and accelerometer biases make
-        /// of the specific force, the larger of both axes'. On the ground it is small whatever the tilt.
+        /// One standard deviation of the error in horizontal acceleration that comes from tilt and
+        /// accelerometer biases; the larger of both axes. On the ground it is small at any tilt.
         acceleration_sigma: f32 ["m/s^2"],
-        /// One standard deviation of the horizontal velocity, the larger of both axes'.
+        /// One standard deviation of the horizontal velocity; the larger of both axes.
         velocity_sigma: f32 ["m/s"],
         /// One standard deviation of the climb rate.
         climb_sigma: f32 ["m/s"],
-        /// One standard deviation of the gyro's bias about roll and pitch, the larger of both.
+        /// One standard deviation of the gyro bias about roll and pitch; the larger of both.
         gyro_bias_sigma: f32 ["rad/s"],
-        /// The same about yaw.
+        /// One standard deviation of the gyro bias about yaw.
         yaw_bias_sigma: f32 ["rad/s"],
-        /// Is the estimate lost?
+        /// Whether the estimate has diverged.
         diverged: bool,
     }
 }
 
 message! {
-    /// What the mode machine asks of the estimator. Level-triggered, except the reset counters.
+    /// Commands of the mode machine to the estimator. Level-triggered, except for the reset
+    /// counters.
     pub struct EstimatorCommand {
         /// The vehicle stands still on the ground: hold velocity at zero.
         on_ground: bool,
-        /// Its propellers carry it.
+        /// The vehicle is airborne, carried by its propellers.
         flying: bool,
-        /// The accelerometer does not measure: what it says is no specific force.
+        /// The accelerometer has failed: its samples are not the specific force.
         accel_faulty: bool,
-        /// A change of this number asks for position and velocity to be set to zero.
+        /// A change of this number resets position and velocity to zero.
         origin_resets: u32,
-        /// A change of this number asks for a full new start from calibration.
+        /// A change of this number restarts the estimator from the calibration.
         full_resets: u32,
     }
 }
 
 message! {
-    /// What the still-calibration found.
+    /// Result of the calibration at rest.
     pub struct CalibrationResult {
         /// Gyro bias, body FRD.
         gyro_bias: Vec3 ["rad/s"],
-        /// Mean specific force while still, body FRD: gives the first attitude.
+        /// Mean specific force at rest, body FRD. Initialises the attitude.
         specific_force: Vec3 ["m/s^2"],
-        /// Mean magnetic field while still, body FRD; zero without a magnetometer.
+        /// Mean magnetic field at rest, body FRD; zero without a magnetometer.
         field: Vec3 ["uT"],
         /// Barometric altitude of the ground.
         baro_altitude: f32 ["m"],
-        /// Share of the still period that has been collected, 0 to 1.
+        /// Share of the samples at rest that has been collected, 0 to 1.
         progress: f32,
-        /// Finished: the values above may be used.
+        /// Whether the calibration has finished and the values above may be used.
         complete: bool,
-        /// How often motion restarted the collection.
+        /// Number of times that motion restarted the collection.
         restarts: u32,
     }
 }
 
 message! {
-    /// The air, as pitot tube and satellite receiver show it together.
+    /// State of the air, from pitot tube and satellite receiver.
     pub struct AirState {
         /// True airspeed.
         airspeed: f32 ["m/s"],
-        /// What a pitot tube at sea level would show: what wings and surfaces feel.
+        /// Indicated airspeed: the reading of a pitot tube at sea level, on which the forces on
+        /// wings and surfaces depend.
         indicated: f32 ["m/s"],
-        /// Velocity of the air, north and east: where it goes.
+        /// Wind as the velocity of the air over ground, north and east: the direction it blows to.
         wind: [f32; 2] ["m/s"],
-        /// One standard deviation of the wind's worse component.
+        /// One standard deviation of the wind's less certain component.
         wind_sigma: f32 ["m/s"],
-        /// Is the airspeed the pitot tube's? Otherwise it is the velocity over the ground less the wind that was last known.
+        /// Whether the airspeed was measured by the pitot tube. Otherwise it is the velocity over
+        /// ground less the last known wind.
         measured: bool,
     }
 }

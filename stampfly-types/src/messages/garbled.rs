@@ -1,25 +1,31 @@
-//! Garbage among inertial samples, by what no body does. For who flies or judges by samples; not for a sensor that has died, whose
-//! samples are possible one by one.
+//! Detection of corrupt inertial samples, by values that a rigid body cannot reach.
+//!
+//! For estimators and failsafe. Does not detect a failed sensor whose samples are plausible one by
+//! one.
 
 use crate::messages::ImuData;
 use crate::{Duration, Vec3};
 
 impl ImuData {
-    /// After a gap this long nothing is known about what the rate was.
+    /// After a gap of this length the previous rate is of no use for a comparison.
     const GAP: Duration = Duration::from_millis(50);
-    /// Two samples that came together are a period apart, this long at least.
+    /// Lower bound of the time between two samples, for samples that arrive together.
     const PERIOD: Duration = Duration::from_millis(2);
-    /// A body whose samples are missing for longer goes on as it did: only a blow changes its rate by more.
+    /// Upper bound of the time over which the rate may change. Across a longer gap the rate stays
+    /// about constant; only an impact changes it by more.
     const STEADY: Duration = Duration::from_millis(5);
-    /// Share of full scale at which the accelerometer's axes count as full: calibration and decimation move it.
+    /// Share of full scale at which an accelerometer axis counts as saturated, below one because
+    /// calibration and decimation change the value.
     const FULL: f32 = 0.9;
 
-    /// Is this garbage: a shifted frame, a register of `0x8000`, a spike?
+    /// Whether the sample is corrupt: a shifted frame, a register of `0x8000`, a spike.
     ///
-    /// A body with a moment of inertia does not change its rate by more than its torque allows, `angular_acceleration` in rad/s².
-    /// `before` is how long ago the last sample was taken that was believed, and its rate. All three axes of an accelerometer are
-    /// never at its full scale, `accel_full_scale` in m/s², at once. What goes on for longer than a burst is no glitch, which the
-    /// caller has to count.
+    /// Two tests. The rate of a body with inertia changes no faster than `angular_acceleration`,
+    /// rad/s²; `before` is the age and the rate of the last valid sample. All three axes of an
+    /// accelerometer are not at its full scale, `accel_full_scale` in m/s², at the same time.
+    ///
+    /// A fault that lasts longer than a short burst is not a glitch; the caller has to count
+    /// samples for that.
     ///
     /// ```
     /// use stampfly_types::{Duration, Vec3, messages::ImuData};
@@ -36,6 +42,7 @@ impl ImuData {
         angular_acceleration: f32,
         accel_full_scale: f32,
     ) -> bool {
+        // An impact saturates one or two axes; all three at once come from stuck or shifted bits.
         let full = self.accel.to_array().iter().all(|axis| axis.abs() >= Self::FULL * accel_full_scale);
         let jumps = before.is_some_and(|(elapsed, rate)| {
             let limit = angular_acceleration * elapsed.clamp(Self::PERIOD, Self::STEADY).seconds();

@@ -1,40 +1,40 @@
-//! How each sensor fares, and what an estimate is to be put right by.
+//! Health of each sensor, and corrections of an estimate after a sensor fault.
 
 use crate::{Instant, Vec3, message, message_enum};
 
 message_enum! {
-    /// What is wrong with a sensor.
+    /// Fault of a sensor.
     pub enum Finding {
-        /// Nothing that shows.
+        /// No fault detected.
         #[default]
         None = 0,
         /// It repeats a reading, or stays at the end of its range.
         Stuck = 1,
-        /// It shows nothing of a motion that it should see.
+        /// It does not follow a motion that it should measure.
         Blind = 2,
-        /// It moved by more than the vehicle can, from one moment to the next.
+        /// Its reading moved faster than the vehicle can.
         Jumped = 3,
-        /// Single readings are far from their neighbours, and they are many.
+        /// Frequent single readings far from their neighbours.
         Outliers = 4,
         /// It contradicts the other sensors.
         Disagrees = 5,
-        /// Its zero has moved; what it measures is used with the new one.
+        /// Its offset has changed. Its measurements are used with the new offset.
         Shifted = 6,
     }
 }
 
 message! {
-    /// The state of one sensor.
+    /// Health of one sensor.
     pub struct Health {
-        /// What is wrong with it.
+        /// The fault that was detected.
         finding: Finding,
-        /// When that was found.
+        /// Time of the detection.
         since: Instant,
     }
 }
 
 impl Health {
-    /// Is what the sensor measures left out of the estimate?
+    /// Whether the estimator ignores the sensor.
     #[must_use]
     pub fn is_left_out(&self) -> bool {
         !matches!(self.finding, Finding::None | Finding::Shifted)
@@ -42,8 +42,8 @@ impl Health {
 }
 
 message! {
-    /// The state of every sensor that is judged. A sensor with a finding other than
-    /// [`Finding::None`] and [`Finding::Shifted`] is left out of the estimate.
+    /// Health of every monitored sensor. The estimator ignores a sensor with a finding other than
+    /// [`Finding::None`] and [`Finding::Shifted`].
     pub struct SensorFindings {
         /// Gyro.
         gyro: Health,
@@ -57,26 +57,26 @@ message! {
 }
 
 message! {
-    /// By how much an estimate is wrong, because a sensor misled it: what to add, and how uncertain
-    /// the sum is.
+    /// Correction of an estimate after a faulty sensor has corrupted it: values to add, and their
+    /// uncertainty.
     pub struct EstimateCorrection {
-        /// Turn of the attitude, about world axes.
+        /// Rotation of the attitude about world axes.
         turn: Vec3 ["rad"],
-        /// World NED.
+        /// Velocity, world NED.
         velocity: Vec3 ["m/s"],
-        /// World down.
+        /// Position, world down.
         down: f32 ["m"],
-        /// Body FRD.
+        /// Gyro bias, body FRD.
         gyro_bias: Vec3 ["rad/s"],
-        /// Body FRD.
+        /// Accelerometer bias, body FRD.
         accel_bias: Vec3 ["m/s^2"],
-        /// One standard deviation of the tilt afterwards, added to what it was.
+        /// One standard deviation of the tilt after the correction, added to the present one.
         tilt_sigma: f32 ["rad"],
-        /// The same of the horizontal velocity.
+        /// The same for the horizontal velocity.
         velocity_sigma: f32 ["m/s"],
-        /// The same of the gyro's bias about roll and pitch.
+        /// The same for the gyro bias about roll and pitch.
         gyro_bias_sigma: f32 ["rad/s"],
-        /// The same of height and climb rate together; zero where they are right.
+        /// The same for height and climb rate together; zero when they need no correction.
         climb_sigma: f32 ["m/s"],
     }
 }

@@ -10,7 +10,8 @@
 //! | [`control`] | [`ControlOutput`] [`MotorOutput`] [`ServoOutput`] |
 //! | [`system`] | [`FlightStatus`] [`ArmRefusals`] [`SystemAlert`] [`LandDetected`] [`SelfTest`] [`Signal`] |
 //!
-//! No message carries a time stamp: the bus stamps every sample with the instant its data is valid for.
+//! No message contains a time stamp: the bus stamps every sample with the instant its data is valid
+//! for.
 
 pub mod calibration;
 pub mod command;

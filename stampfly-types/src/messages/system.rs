@@ -1,32 +1,32 @@
-//! State of the whole vehicle: mode, alerts, contact with the ground, signals to people.
+//! State of the vehicle: phase, mode, alerts, ground contact, signals to people.
 
 use crate::{Instant, message, message_enum, message_flags};
 
 message_enum! {
-    /// Where the vehicle is between power-on and landing. Failsafe is an event, never a phase.
+    /// Phase of a flight. Failsafe is an event, not a phase.
     pub enum FlightPhase {
-        /// Sensors and calibration are starting.
+        /// Sensors start and the calibration at rest runs.
         #[default]
         Init = 0,
         /// Standing on the ground, motors off.
         IdleGround = 1,
-        /// Lifted by a hand, motors off.
+        /// Held in the hand, motors off.
         IdleHeld = 2,
         /// Standing, motors may turn.
         Armed = 3,
         /// Climbing to the take-off height.
         TakeOff = 4,
-        /// In the air under the flight mode.
+        /// Flying in the flight mode.
         Flying = 5,
         /// Descending to the ground.
         Landing = 6,
-        /// Turning over once, out of a hover and back into it.
+        /// Flipping once, from a hover back to a hover.
         Flip = 7,
     }
 }
 
 message_enum! {
-    /// What the sticks mean while flying.
+    /// Meaning of the sticks in flight.
     pub enum FlightMode {
         /// Sticks command rates; throttle commands thrust.
         Acro = 0,
@@ -35,14 +35,14 @@ message_enum! {
         Stabilize = 1,
         /// Sticks command angles; throttle commands climb rate.
         AltHold = 2,
-        /// Sticks command velocities; released, the vehicle holds its place.
+        /// Sticks command velocities; with centred sticks the vehicle holds its position.
         PosHold = 3,
     }
 }
 
 impl FlightMode {
-    /// Is the pilot's throttle a thrust? In the other modes it is a climb rate, and the vehicle holds its height while the
-    /// stick is centred.
+    /// Whether the throttle stick commands thrust. In the other modes it commands a climb rate, and
+    /// the vehicle holds its height while the stick is centred.
     ///
     /// ```
     /// use stampfly_types::messages::FlightMode;
@@ -57,7 +57,7 @@ impl FlightMode {
         }
     }
 
-    /// Do the sticks command rates? In the other modes released sticks level the vehicle.
+    /// Whether the sticks command rates. In the other modes centred sticks level the vehicle.
     #[must_use]
     pub const fn commands_rates(self) -> bool {
         match self {
@@ -66,7 +66,7 @@ impl FlightMode {
         }
     }
 
-    /// Does the vehicle hold its place when the sticks are released?
+    /// Whether the vehicle holds its position when the sticks are centred.
     #[must_use]
     pub const fn holds_place(self) -> bool {
         match self {
@@ -77,7 +77,7 @@ impl FlightMode {
 }
 
 message_flags! {
-    /// Why the vehicle will not arm. Empty means it will.
+    /// Reasons for which the vehicle refuses to arm. Empty when it would arm.
     pub struct ArmBlocks {
         /// Still-calibration has not finished.
         CALIBRATING = 0,
@@ -123,25 +123,25 @@ message_flags! {
 }
 
 message! {
-    /// Why the vehicle refused to arm when it was last asked to: the first four reasons, the weightiest first.
+    /// The latest refusal to arm: the first four reasons, in order of importance.
     pub struct ArmRefusals {
-        /// Refusals since power-on.
+        /// Number of refusals since power-on.
         attempts: u32,
-        /// Every reason.
+        /// All reasons.
         blocks: ArmBlocks,
-        /// The reasons, one an entry; none in an entry that is not used.
+        /// One reason per entry; empty in unused entries.
         check: [ArmBlocks; 4],
-        /// The value that was found, in the unit of the check; 1 for a condition.
+        /// The value found by the check, in the unit of the check; 1 for a condition.
         value: [f32; 4],
-        /// The limit it was beyond; 0 for a condition.
+        /// The limit that the value violates; 0 for a condition.
         limit: [f32; 4],
-        /// Since when.
+        /// Time since which the reason has existed.
         since: [Instant; 4],
     }
 }
 
 message_flags! {
-    /// Why the vehicle will not turn over. Empty means it will.
+    /// Reasons for which the vehicle refuses to flip. Empty when it would flip.
     pub struct FlipBlocks {
         /// It does not fly.
         NOT_FLYING = 0,
@@ -161,9 +161,9 @@ message_flags! {
 }
 
 message_enum! {
-    /// Who has authority over the set-point.
+    /// Source of the command in force.
     pub enum CommandSource {
-        /// Nobody: level, hold, no climb.
+        /// No source: level, no climb, position held.
         #[default]
         None = 0,
         /// The pilot's sticks.
@@ -176,23 +176,24 @@ message_enum! {
 }
 
 message! {
-    /// The mode machine's decision.
+    /// Output of the mode machine.
     pub struct FlightStatus {
-        /// Where the vehicle is between power-on and landing.
+        /// Phase of the flight.
         phase: FlightPhase,
-        /// The flight mode, in force while flying.
+        /// Flight mode, in force while flying.
         mode: FlightMode,
-        /// May the motors turn?
+        /// Whether the motors may turn.
         armed: bool,
-        /// Who has authority over the armed vehicle, also while silent; none for a disarmed one or one armed by a click.
+        /// Source in command of the armed vehicle, also while it sends nothing. None for a vehicle
+        /// that is disarmed or was armed with the button.
         commander: CommandSource,
         /// Pairing with a transmitter.
         pairing: bool,
-        /// Why arming would be refused right now.
+        /// Reasons for which arming would be refused now.
         blocks: ArmBlocks,
-        /// Why a flip would be refused right now.
+        /// Reasons for which a flip would be refused now.
         flip_blocks: FlipBlocks,
-        /// Transitions since power-on.
+        /// Number of transitions since power-on.
         transitions: u32,
         /// A change of this number resets the controller.
         control_resets: u32,
@@ -200,8 +201,8 @@ message! {
 }
 
 message_flags! {
-    /// Conditions the failsafe has found. Level-triggered: a bit stays while its condition does, and the ones that
-    /// must not be missed stay until the vehicle is disarmed.
+    /// Conditions detected by the failsafe. Level-triggered: a bit is set while its condition
+    /// lasts. The critical ones stay set until the vehicle is disarmed.
     pub struct Alerts {
         /// No authentic command for too long, or never one.
         COMM_LOST = 0,
@@ -265,36 +266,36 @@ message_flags! {
 }
 
 message_enum! {
-    /// How the self test at power-on ended.
+    /// Result of the self test at power-on.
     pub enum SelfTestVerdict {
-        /// It was not run.
+        /// The test did not run.
         #[default]
         NotRun = 0,
-        /// Every bit as recorded.
+        /// All bits equal those recorded.
         Identical = 1,
-        /// Other bits; outputs within the tolerance.
+        /// Some bits differ; the outputs are within the tolerance.
         WithinTolerance = 2,
-        /// Outputs beyond the tolerance, or the test could not be run.
+        /// Outputs exceed the tolerance, or the test could not run.
         Failed = 3,
     }
 }
 
 message! {
-    /// What the self test at power-on found.
+    /// Report of the self test at power-on.
     pub struct SelfTest {
-        /// How it ended.
+        /// Result of the test.
         verdict: SelfTestVerdict,
-        /// Largest deviation of a motor's duty; infinite when one was no number.
+        /// Largest deviation of a motor's duty; infinite when one was NaN.
         worst: f32,
     }
 }
 
 message! {
-    /// The failsafe's findings.
+    /// Alerts of the failsafe.
     pub struct SystemAlert {
-        /// Conditions present now, or latched.
+        /// Conditions that exist now or are latched.
         active: Alerts,
-        /// Conditions that became present since power-on, for the log and for people.
+        /// All conditions since power-on, for the log and for operators.
         seen: Alerts,
     }
 }
@@ -311,17 +312,17 @@ message_enum! {
 }
 
 message! {
-    /// What the land detector sees, and what take-off and landing ask of the vertical controller.
+    /// Output of the land detector, and its requests to the vertical controller.
     pub struct LandDetected {
         /// Contact with the ground.
         contact: GroundContact,
-        /// Take-off has reached its height and settled.
+        /// Whether take-off has reached its height and settled.
         takeoff_complete: bool,
-        /// Touchdown is confirmed.
+        /// Whether touchdown is confirmed.
         landed: bool,
-        /// Upper limit on collective thrust as a share of hover thrust; `f32::MAX` while unlimited.
+        /// Upper limit of collective thrust as a share of hover thrust; `f32::MAX` without a limit.
         thrust_ceiling: f32,
-        /// Descent speed asked for while landing.
+        /// Commanded descent speed during landing.
         descent_rate: f32 ["m/s"],
     }
 }
@@ -344,21 +345,21 @@ message_enum! {
         Pair = 5,
         /// Low battery.
         LowBattery = 6,
-        /// Something is wrong.
+        /// An error.
         Error = 7,
     }
 }
 
 message! {
-    /// What people see and hear.
+    /// Lights and sounds for people nearby.
     pub struct Signal {
         /// Colour of the status light, red, green, blue, 0 to 255.
         status: [u8; 3],
-        /// Colour of the two body lights.
+        /// Colour of the two body lights, red, green, blue, 0 to 255.
         body: [u8; 3],
-        /// Tune to start; repeats are edges of `tone_count`.
+        /// Tune to play. It starts when `tone_count` changes.
         tone: Tone,
-        /// A change of this number starts the tune.
+        /// Counter whose change starts the tune.
         tone_count: u32,
     }
 }

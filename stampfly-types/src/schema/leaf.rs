@@ -1,21 +1,21 @@
 //! The leaves of a schema: its scalars and arrays of scalars, in word order, each with a flat name.
 //!
-//! Use [`leaves`] wherever words become something that people or tools read: a log, a console, a plot. Nothing else walks
-//! the tree of a schema.
+//! Use [`leaves`] wherever words are shown to people or tools: in a log, a console, a plot. It is
+//! the only code that walks the tree of a schema.
 
 use super::{FieldInfo, FieldKind, MAX_DEPTH, Value};
 use core::fmt;
 
-/// The flat name of a leaf: its field, behind those it is nested in, joined by underscores.
+/// The flat name of a leaf: the names of its enclosing fields and its own, joined by underscores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafName {
-    /// Name, and place in an array of messages or options.
+    /// Name, and index in an array of messages or options.
     parts: [(&'static str, Option<usize>); MAX_DEPTH],
     length: usize,
 }
 
 impl LeafName {
-    /// The innermost field's own name.
+    /// Name of the innermost named field.
     #[must_use]
     pub fn field(&self) -> &'static str {
         let names = self.parts.iter().take(self.length).map(|(name, _)| *name);
@@ -47,29 +47,30 @@ impl fmt::Display for LeafName {
     }
 }
 
-/// A scalar or an array of scalars of a message.
+/// A scalar of a message, or an array of scalars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Leaf {
-    /// Its flat name.
+    /// Flat name.
     pub name: LeafName,
-    /// SI unit, empty where there is none.
+    /// SI unit, empty for dimensionless fields.
     pub unit: &'static str,
     /// Storage of one element; neither a message nor an option.
     pub kind: FieldKind,
     /// Number of elements, at least one.
     pub count: usize,
-    /// Where its words begin in the message's.
+    /// Index of its first word in the message.
     pub offset: usize,
 }
 
 impl Leaf {
-    /// Number of words, all elements together.
+    /// Number of words of all elements together.
     #[must_use]
     pub const fn size(&self) -> usize {
         self.count * self.kind.size()
     }
 
-    /// The words of one element among the message's; `None` when there is no such element or its words are missing.
+    /// The words of one element, from the words of the message. `None` when there is no such
+    /// element or words are missing.
     #[must_use]
     pub fn words<'w>(&self, message: &'w [u32], element: usize) -> Option<&'w [u32]> {
         if element >= self.count {
@@ -79,14 +80,14 @@ impl Leaf {
         message.get(self.offset + element * size..)?.get(..size)
     }
 
-    /// The value of one element; `None` when there is no such element or its words are missing.
+    /// The value of one element. `None` when there is no such element or words are missing.
     #[must_use]
     pub fn value(&self, message: &[u32], element: usize) -> Option<Value> {
         self.kind.value(self.words(message, element)?)
     }
 }
 
-/// A message, an option or an array of such that is being walked through.
+/// A message, an option or an array of these on the current path through the tree.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     name: &'static str,
@@ -94,11 +95,11 @@ struct Node {
     kind: FieldKind,
     count: usize,
     element: usize,
-    /// Which part of the element comes next: a field of a message; the presence, then the value of an option.
+    /// Next part of the element: a field of a message; the presence, then the value of an option.
     step: usize,
 }
 
-/// See [`leaves`].
+/// Iterator returned by [`leaves`].
 #[derive(Clone, Debug)]
 pub struct Leaves {
     stack: [Node; MAX_DEPTH],
@@ -122,7 +123,7 @@ pub struct Leaves {
 ///     pub struct Cart {
 ///         /// Where it is.
 ///         position: Vec3 ["m"],
-///         /// What it weighs, if anybody has weighed it.
+///     /// Its mass, when known.
 ///         mass: Option<f32> ["kg"],
 ///         /// Left, right.
 ///         wheels: [Wheel; 2],
@@ -145,7 +146,7 @@ pub const fn leaves(fields: &'static [FieldInfo]) -> Leaves {
 impl Leaves {
     fn name(&self, field: &'static str) -> LeafName {
         let mut name = LeafName { parts: [("", None); MAX_DEPTH], length: 0 };
-        // The first one is the message itself.
+        // The first node is the message itself, which has no name.
         for node in self.stack.iter().take(self.depth).skip(1) {
             name.push(node.name, (node.count > 1).then_some(node.element));
         }
@@ -161,6 +162,7 @@ impl Iterator for Leaves {
     fn next(&mut self) -> Option<Leaf> {
         loop {
             let node = self.stack.get_mut(self.depth.checked_sub(1)?)?;
+            // All elements of this node are done: return to the enclosing one.
             if node.element >= node.count {
                 self.depth -= 1;
                 continue;
@@ -183,6 +185,7 @@ impl Iterator for Leaves {
                 node.step = 0;
                 continue;
             };
+            // `checked` bounds the depth, so a nested node always has a place on the stack.
             if matches!(kind, FieldKind::Message(_) | FieldKind::Option { .. })
                 && let Some(place) = self.stack.get_mut(self.depth)
             {
@@ -192,6 +195,7 @@ impl Iterator for Leaves {
             }
             let offset = self.offset;
             self.offset += count * kind.size();
+            // An array of length zero has no words and therefore no leaf.
             if count > 0 {
                 return Some(Leaf { name: self.name(name), unit, kind, count, offset });
             }

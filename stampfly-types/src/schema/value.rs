@@ -1,41 +1,41 @@
-//! A scalar of a sample as a person or a tool sees it: a number, a truth value, a name.
+//! Scalar values as people and tools read them: numbers, truth values, names.
 //!
-//! [`FieldKind::value`](super::FieldKind::value) makes one of words. Not for computing in flight: a runnable has the message
-//! itself.
+//! [`FieldKind::value`](super::FieldKind::value) makes a [`Value`] from words. Not for computations
+//! in flight, where a runnable has the message itself.
 
 use core::fmt;
 
-/// A scalar of a sample, with what its kind says about it.
+/// A scalar of a sample, with the names its kind defines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// A single.
+    /// Single precision.
     F32(f32),
-    /// A double.
+    /// Double precision.
     F64(f64),
-    /// An unsigned integer of any size.
+    /// Unsigned integer of any size.
     Unsigned(u64),
-    /// A signed integer of any size.
+    /// Signed integer of any size.
     Signed(i64),
     /// A truth value.
     Bool(bool),
-    /// One of the named values, or a number that has no name.
+    /// One of a list of named values, or a number without a name.
     Enum {
         /// The number.
         number: u32,
-        /// All names and numbers.
+        /// Names and numbers of the list.
         names: &'static [(&'static str, u32)],
     },
     /// A set of named bits.
     Flags {
         /// The bits.
         bits: u32,
-        /// All names and masks.
+        /// Names and masks of the flags.
         names: &'static [(&'static str, u32)],
     },
 }
 
 impl Value {
-    /// The value as a number: exact for everything but 64-bit integers beyond 2⁵³.
+    /// The value as a number. Exact, except for 64-bit integers beyond 2⁵³.
     #[must_use]
     pub fn as_f64(self) -> f64 {
         match self {
@@ -50,7 +50,8 @@ impl Value {
     }
 }
 
-/// Names for what has names: `Flying`, `IMPACT LOW_BATTERY`, `none`; `7?` for a number without one.
+/// Enumerations and flags as names: `Flying`, `IMPACT LOW_BATTERY`, `none`; `7?` for a number
+/// without a name.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

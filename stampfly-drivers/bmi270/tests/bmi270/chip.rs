@@ -1,4 +1,5 @@
-//! The chip of closures: registers, a FIFO that fills with virtual time, faults of single accesses.
+//! A chip made of closures: registers, a FIFO that fills in virtual time, faults of single
+//! accesses.
 
 use stampfly_bmi270::{Bmi270, Config};
 use stampfly_driver_core::Timebase;
@@ -8,24 +9,24 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 pub const BLOB: [u8; 600] = [0xC8; 600];
-/// Nominal chip period in nanoseconds, of 16 ticks.
+/// Nominal sample period of the chip, ns, for 16 ticks.
 pub const PERIOD: u64 = 625_000;
 
 pub struct Chip {
     pub clock: Clock,
     pub registers: [u8; 128],
     pub writes: Vec<(u8, Vec<u8>)>,
-    /// Chip samples taken out of the FIFO so far.
+    /// Number of chip samples read from the FIFO.
     pub consumed: u64,
-    /// The next FIFO read begins with this header.
+    /// Header at the beginning of the next FIFO read.
     pub header: Option<u8>,
     /// Faults of the next reads of a register.
     pub faults: Vec<(u8, Fault)>,
-    /// A bit of the next read of a register arrives the other way round.
+    /// A bit that is inverted in the next read of a register.
     pub flip: Option<(u8, usize)>,
     pub starts: bool,
     pub frozen: bool,
-    /// Chip period in nanoseconds.
+    /// Sample period of the chip, ns.
     pub period: u64,
     /// Counts of one sample: accelerometer, gyroscope.
     pub sample: fn(u64) -> [i16; 6],
@@ -54,7 +55,7 @@ impl Chip {
         self.clock.now().as_micros() * 1_000
     }
 
-    /// Chip samples taken until now.
+    /// Number of chip samples taken so far.
     pub fn produced(&self) -> u64 {
         if self.frozen { self.consumed } else { self.nanos() / self.period }
     }
@@ -68,7 +69,7 @@ impl Chip {
                     (0x7E, [0xB0]) => self.consumed = self.produced(),
                     (0x59, [1]) => self.registers[0x21] = if self.starts { 1 } else { 2 },
                     (0x5E, _) => {}
-                    // Deflections of ±9 g on every axis with the data sheet's signs.
+                    // Deflections of ±9 g on every axis, with the signs of the data sheet.
                     (0x6D, [command]) => {
                         let sign: i16 = if command & 4 != 0 { 18_432 } else { -18_432 };
                         for (axis, value) in [sign, -sign, sign].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The interrupt pin: followed while it can be trusted, ignored when not.
+//! The interrupt pin: used while it is reliable, ignored otherwise.
 
 use super::chip::{PERIOD, Shared, bench, driver};
 use embedded_hal_async::digital::Wait;
@@ -10,7 +10,7 @@ use stampfly_driver_fakes::closure::Clock;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// INT1: high while four frames are in the FIFO. Whoever waits moves time on to when they are.
+/// INT1: high while four frames are in the FIFO. Waiting for it advances the time.
 struct Pin {
     clock: Clock,
     chip: Shared,

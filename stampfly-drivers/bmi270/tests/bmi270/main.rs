@@ -1,4 +1,5 @@
-//! The BMI270 driver against a chip of closures: registers, a FIFO that fills with virtual time, and faults.
+//! Tests of the BMI270 driver on a chip made of closures: registers, a FIFO that fills in virtual
+//! time, and faults.
 
 mod chip;
 mod interrupt;
@@ -33,7 +34,7 @@ fn it_starts_as_the_data_sheet_says_and_uploads_every_byte_where_it_belongs() {
 #[test]
 fn samples_come_at_400_hz_in_si_units_and_body_axes_with_the_cross_axis_correction() {
     let (clock, chip) = bench();
-    // −64/512 of the rate about z belongs to x.
+    // −64/512 of the rate about z is added to x.
     chip.borrow_mut().registers[0x3C] = 0x40;
     chip.borrow_mut().registers[0x22..0x24].copy_from_slice(&[0x00, 0x02]);
     let mut imu = driver(&clock, &chip, Config::default());
@@ -58,7 +59,7 @@ fn samples_come_at_400_hz_in_si_units_and_body_axes_with_the_cross_axis_correcti
 #[test]
 fn the_stamp_is_the_middle_of_the_filter() {
     let (clock, chip) = bench();
-    // A ramp: the value of chip sample n, taken at n periods, is n modulo a large number.
+    // A ramp: chip sample n, taken at n periods, has the value n modulo a large number.
     chip.borrow_mut().sample = |n| [(n % 8_192) as i16; 6];
     let mut imu = driver(&clock, &chip, Config::default());
     for _ in 0..20 {
@@ -81,7 +82,7 @@ fn a_chip_clock_that_is_off_costs_no_sample() {
             let sample = block_on(imu.next()).expect("a sample");
             let step = (sample.data.accel.x - before.data.accel.x) / stampfly_types::GRAVITY * 4096.0;
             assert!((step - 4.0).abs() < 1e-2, "{step}");
-            // One tick, and three nominal periods that the chip makes in another time.
+            // Tolerance: one tick, and three nominal periods that take another time on the chip.
             assert!((sample.at.since(before.at).as_micros() * 1_000).abs_diff(4 * period) <= 60_000);
             assert!(clock.now().since(sample.at) < Duration::from_micros(2_300));
             before = sample;
@@ -266,7 +267,7 @@ fn a_call_dropped_in_the_middle_of_a_fifo_read_never_mixes_old_samples_with_new(
     let mut imu = driver(&clock, &chip, Config::default());
     block_on(imu.next()).expect("a sample");
     chip.borrow_mut().faults.push((0x26, Fault::Hang));
-    // The bus hangs in the FIFO read, and whoever asked loses patience before the driver does.
+    // The bus hangs in the FIFO read, and the caller gives up before the driver does.
     clock.advance(2_500);
     clock.stop(true);
     cancel(imu.next());

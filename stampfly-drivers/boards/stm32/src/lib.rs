@@ -1,2 +1,3 @@
-//! Nothing: the programs are in the folder `examples` of each chip's crate, and `Cargo.toml` lists them.
+//! Empty: the programs are in the folder `examples` of each chip's crate and listed in
+//! `Cargo.toml`.
 #![no_std]

@@ -1,11 +1,12 @@
-//! How a chip is turned on its board.
+//! Orientation of a chip on its board, in steps of 90°.
 //!
-//! Every driver delivers in the body frame; which chip axis points where is the board's knowledge and comes in as an
-//! [`AxisMap`]. Not for mounting errors of a few degrees: those are calibration.
+//! Every driver delivers its samples in the body frame (FRD). The board's code passes the mounting
+//! of each chip as an [`AxisMap`]. Not for mounting errors of a few degrees: correct those by
+//! calibration.
 
 use stampfly_types::Vec3;
 
-/// A chip axis, in its own or in the opposite direction.
+/// An axis of the chip, in its positive or negative direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "the names say it")]
@@ -43,12 +44,12 @@ impl Axis {
     }
 }
 
-/// Which chip axis points along each body axis (FRD).
+/// Maps each body axis (FRD) to the chip axis that points along it.
 ///
 /// ```
 /// use stampfly_driver_core::chip::{Axis, AxisMap};
 /// use stampfly_types::Vec3;
-/// // A chip that lies upside down, its x axis to the right.
+/// // A chip mounted upside down, with its x axis to the right.
 /// let map = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 /// assert_eq!(map.to_body(Vec3::new(1.0, 2.0, 3.0)), Vec3::new(2.0, 1.0, -3.0));
 /// assert_eq!(AxisMap::new(Axis::PlusX, Axis::PlusX, Axis::PlusZ), None, "an axis is used twice");
@@ -63,22 +64,25 @@ pub struct AxisMap {
 }
 
 impl AxisMap {
-    /// The chip's axes are the body's.
+    /// The chip's axes coincide with the body's.
     pub const IDENTITY: Self = Self { forward: Axis::PlusX, right: Axis::PlusY, down: Axis::PlusZ };
 
-    /// A map of the chip axes that point forward, to the right and down; `None` when it is not a rotation.
+    /// A map from the chip axes that point forward, right and down. `None` when an axis is used
+    /// twice or when the axes are a mirror image instead of a rotation.
     #[must_use]
     pub const fn new(forward: Axis, right: Axis, down: Axis) -> Option<Self> {
         let (first, second, third) = (forward.number(), right.number(), down.number());
         if first == second || second == third || third == first {
             return None;
         }
+        // The determinant is the sign of the permutation, plus when it is cyclic, times the product
+        // of the three directions. A rotation has plus one.
         let cyclic = (first + 1) % 3 == second;
         let negative = forward.is_negative() ^ right.is_negative() ^ down.is_negative();
         if cyclic == negative { None } else { Some(Self { forward, right, down }) }
     }
 
-    /// A vector in chip axes, turned into body axes.
+    /// Turns a vector from chip axes into body axes.
     #[must_use]
     pub fn to_body(self, chip: Vec3) -> Vec3 {
         Vec3::new(self.forward.of(&chip), self.right.of(&chip), self.down.of(&chip))

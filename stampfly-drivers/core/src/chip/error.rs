@@ -1,45 +1,50 @@
-//! What can go wrong with a chip on a bus.
+//! Errors of a chip on a bus.
 
 use crate::{SensorError, SensorErrorKind};
 use core::error::Error;
 use core::fmt::{self, Debug, Display};
 
-/// An error of a chip driver; `E` is the bus's own.
+/// An error of a chip driver. `E` is the error type of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ChipError<E> {
-    /// The bus refused or garbled the transfer.
+    /// The bus reported an error in the transfer.
     Bus(E),
-    /// The transfer took longer than its length allows ([`TransferLimit`](super::TransferLimit)) and was given up.
+    /// The transfer took longer than its length allows ([`TransferLimit`](super::TransferLimit)),
+    /// and the driver gave it up.
     BusTimeout,
     /// The chip answers but made no new sample in time.
     NoSample,
-    /// Another chip, or none, answered; this is what it called itself.
+    /// The chip's identification is not the expected one: another chip, or none, is connected.
     Identification {
         /// The identification that was read.
         found: u16,
     },
     /// A pin of the chip could not be set.
     Pin,
-    /// Another chip answers at the address this one starts up with, so it is kept in reset.
+    /// Another device answers at the address this chip starts up with, so the driver keeps this
+    /// chip in reset.
     AddressTaken,
-    /// The configuration handed to the driver cannot be, so nothing was sent.
+    /// The configuration passed to the driver is invalid. The driver has written nothing to the
+    /// chip.
     InvalidConfiguration,
-    /// The chip did not start or did not keep what was written; this is its status register, or what it kept.
+    /// The chip did not start, or did not keep a setting.
     Configuration {
-        /// The chip's answer.
+        /// The chip's status register, or the setting as it was read back.
         status: u8,
     },
     /// The chip lost its configuration since the last call. The next call sets it up again.
     Restarted,
     /// The self test failed: the chip answers, but does not measure.
     SelfTest,
-    /// The chip answered with data that cannot be.
+    /// The chip returned invalid data.
     Data,
-    /// What the chip measured could not be right. The driver measures another way from the next call on.
+    /// The measurement was implausible. The driver uses another measuring mode from the next call
+    /// on.
     Implausible,
-    /// The clock of the [`Timebase`](crate::Timebase) stands still while its delays end, so no deadline would ever come.
+    /// The clock of the [`Timebase`](crate::Timebase) stands still while its delays return, so no
+    /// deadline would ever pass.
     ClockStopped,
 }
 
@@ -48,7 +53,8 @@ impl<E: Debug> SensorError for ChipError<E> {
         match self {
             Self::Bus(_) => SensorErrorKind::Bus,
             Self::BusTimeout | Self::NoSample => SensorErrorKind::Timeout,
-            // A line that nobody drives; no chip calls itself so.
+            // All zeros or all ones: the data line is not driven. No supported chip has such an
+            // identification.
             Self::Identification { found: 0 | 0xFF | 0xFFFF } => SensorErrorKind::Absent,
             Self::Identification { .. } => SensorErrorKind::Identification,
             Self::InvalidConfiguration | Self::Configuration { .. } | Self::AddressTaken => {

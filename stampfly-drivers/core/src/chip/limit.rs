@@ -1,15 +1,18 @@
-//! How long one transfer may take before its driver gives it up.
+//! Time limit of one transfer, after which the driver gives it up.
 //!
-//! A constant for all transfers is either too long for a 12-byte read in the flight band or too short for a
-//! configuration file on a slow bus. So the limit follows the length. It is wall time: an asynchronous transfer costs
-//! the processor its start and its end, and a blocking bus ([`blocking`](crate::blocking)) cannot be given up at all.
+//! One constant for all transfers is either too long for a 12-byte read in the flight band or too
+//! short for a configuration file on a slow bus, so the limit follows the length. It is wall time:
+//! an asynchronous transfer occupies the processor only at its start and at its end. A driver
+//! cannot give up a transfer on a blocking bus ([`blocking`](crate::blocking)) at all.
 //!
-//! It begins when the driver asks for the bus, since a driver cannot know when it gets it: so there is a margin for the neighbours. Every driver takes
-//! another limit with `with_transfer_limit`. It is not a real-time guarantee: a device may stretch the clock.
+//! The limit starts when the driver requests the bus, because a driver cannot know when the
+//! transfer begins. A margin therefore covers the transfers of other devices on the bus. Every
+//! driver on a [`Port`](super::Port) takes another limit with `with_transfer_limit`. The limit is
+//! not a real-time guarantee: a device may stretch the clock.
 
 use stampfly_types::Duration;
 
-/// A limit as a function of length: so much per byte, and so much for everything else.
+/// A time limit as a linear function of the transfer's length: a fixed margin and a time per byte.
 ///
 /// ```
 /// use stampfly_driver_core::chip::TransferLimit;
@@ -26,25 +29,28 @@ pub struct TransferLimit {
 }
 
 impl TransferLimit {
-    /// SPI at 1 MHz or more on a bus that is shared with anything: 200 ms for the neighbours' transfers. What every driver on SPI has
-    /// unless it is told otherwise.
+    /// SPI at 1 MHz or more on a bus shared with devices of any kind: 200 ms for their transfers.
+    /// The default of every driver on SPI.
     pub const SPI: Self = Self { byte: Duration::from_micros(8), margin: Duration::from_micros(200_000) };
-    /// SPI at 4 MHz or more, whose owner waits for no more than one short transfer of a neighbour
-    /// ([`slot`](crate::slot)): at most 1 ms for everything the drivers here transfer at once.
+    /// SPI at 4 MHz or more on a bus where the driver waits for at most one short transfer of
+    /// another device ([`slot`](crate::slot)). At most 1 ms for the longest transfer of the drivers
+    /// in this family.
     pub const SPI_SENSORS: Self = Self { byte: Duration::from_micros(2), margin: Duration::from_micros(300) };
-    /// SPI of a guest on a bus with slots: 1 MHz or more, and it waits for its slot, 5 ms when the lead is silent.
+    /// SPI at 1 MHz or more for the guest on a bus with slots. The guest waits for its slot, up to
+    /// 5 ms when the lead is silent.
     pub const SPI_GUEST: Self = Self { byte: Duration::from_micros(8), margin: Duration::from_micros(9_000) };
-    /// I2C at 100 kHz or more, nine clocks to a byte, on a bus that is shared with anything: 200 ms for the neighbours' transfers. A
-    /// display's frame of a kilobyte takes 92 ms there. What every driver on I2C has unless it is told
-    /// otherwise.
+    /// I2C at 100 kHz or more, with nine clocks per byte, on a bus shared with devices of any kind:
+    /// 200 ms for their transfers. One frame of a display, 1 kB, takes 92 ms at that rate. The
+    /// default of every driver on I2C.
     pub const I2C: Self = Self { byte: Duration::from_micros(90), margin: Duration::from_micros(200_000) };
-    /// The same on a bus of sensors alone: 10 ms for the neighbours' transfers, and for one of them that stretches the clock. What hangs is
-    /// known twenty times as soon.
+    /// I2C at 100 kHz or more on a bus with sensors only: 10 ms for the transfers of the others,
+    /// clock stretching included. Detects a bus that hangs twenty times faster than
+    /// [`I2C`](Self::I2C).
     pub const I2C_SENSORS: Self = Self { byte: Duration::from_micros(90), margin: Duration::from_micros(10_000) };
-    /// Addresses, dummy byte, command.
+    /// Bytes of a transfer besides its data: addresses, a dummy byte, a command.
     const OVERHEAD: u64 = 4;
 
-    /// The limit of a transfer of so many bytes of data.
+    /// The limit of a transfer of `bytes` bytes of data.
     #[must_use]
     pub const fn of(self, bytes: usize) -> Duration {
         let transfer = self.byte.as_micros().saturating_mul((bytes as u64).saturating_add(Self::OVERHEAD));

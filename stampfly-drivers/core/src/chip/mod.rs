@@ -1,11 +1,13 @@
-//! What the driver of a chip is made of: registers behind any wires, an error, a limit of time, the chip's place on its board.
+//! Building blocks of a chip driver: register access, errors, transfer limits and mounting.
 //!
-//! For whoever writes a driver: a [`Port`] reads and writes the registers, and every transfer ends in bounded time. Whoever uses one
-//! meets [`ChipError`], [`AxisMap`] and [`TransferLimit`]. Not for a chip without registers; that one has its bus to itself.
+//! For authors of drivers: a [`Port`] reads and writes registers, and every transfer ends in
+//! bounded time. Users of a driver meet [`ChipError`], [`AxisMap`] and [`TransferLimit`]. For a
+//! chip without registers use [`bounded`] on the bus directly.
 //!
-//! # What drivers on a port expect of the board
-//! A register is written in one piece on I2C, whatever a bus does between the operations of a transaction: Linux and some controllers start
-//! again there. On SPI the chip select stays low for a whole transaction, as `SpiDevice` asks.
+//! # Requirements on the board
+//! On I2C a port writes register and data as one message, because Linux and some controllers send a
+//! repeated start between the operations of a transaction. On SPI the chip select must stay low for
+//! a whole transaction, as the contract of `SpiDevice` requires.
 
 mod axis;
 mod error;

@@ -1,4 +1,4 @@
-//! A chip as registers of bytes, whichever wires it hangs on.
+//! Register access over I2C or SPI, with a time limit on every transfer.
 
 use super::{ChipError, TransferLimit};
 use crate::Timebase;
@@ -9,43 +9,45 @@ use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use stampfly_types::{Duration, Instant};
 
-/// Registers that count up by themselves; `A` is their address, of one byte or of two.
+/// Registers whose address increments during a transfer. `A` is the type of an address: one byte or
+/// two.
 pub trait Registers<A = u8> {
     /// The bus's error.
     type Error: Debug;
-    /// How long a transfer on these wires may take, unless the driver is told otherwise.
+    /// Default time limit of a transfer.
     const LIMIT: TransferLimit;
-    /// So many bytes may be written at once; even. What is longer is for the driver to divide.
+    /// Most bytes per write, an even number. The driver splits longer data.
     const LONGEST_WRITE: usize;
 
-    /// Reads registers from `register` on.
+    /// Reads consecutive registers, starting at `register`.
     ///
     /// # Errors
-    /// When the bus refuses.
+    /// When the bus reports an error.
     async fn read(&mut self, register: A, into: &mut [u8]) -> Result<(), Self::Error>;
 
-    /// Writes registers from `register` on.
+    /// Writes consecutive registers, starting at `register`.
     ///
     /// # Errors
-    /// When the bus refuses.
+    /// When the bus reports an error.
     async fn write(&mut self, register: A, data: &[u8]) -> Result<(), Self::Error>;
 }
 
-/// Registers that give back the wires they were made of.
+/// Register access that can be taken apart again.
 pub trait Wires {
-    /// The bus or device.
+    /// The bus or the SPI device.
     type Bus;
 
-    /// Gives it back.
+    /// Returns the bus or the SPI device.
     fn release(self) -> Self::Bus;
 }
 
-/// Bytes of data in an I2C write: as many as Linux's SMBus calls and the buffers of small controllers hold.
+/// Most bytes of data in an I2C write: the limit of Linux's SMBus calls and of the buffers of small
+/// controllers.
 const I2C_WRITE: usize = 32;
-/// The same with a register of two bytes.
+/// Length of such a write, with a register address of two bytes.
 const MESSAGE: usize = I2C_WRITE + 2;
 
-/// Registers behind an I2C address; addresses of two bytes go out high byte first.
+/// Registers of a chip on I2C. A register address of two bytes is sent high byte first.
 #[derive(Debug)]
 pub struct I2cRegisters<I> {
     bus: I,
@@ -63,8 +65,9 @@ impl<I: I2c> I2cRegisters<I> {
     }
 
     async fn write_after(&mut self, register: &[u8], data: &[u8]) -> Result<(), I::Error> {
-        // Register and data in one piece. Two writes in one transaction have to do as well, says embedded-hal; but Linux makes a message
-        // of each, and the start between them ends the first: the chip takes the data for an address
+        // Register and data in one message. By embedded-hal's contract two writes in one
+        // transaction are one message, too, but Linux sends a start between them. That start ends
+        // the first write, and the chip takes the data for a register address
         // (rust-embedded/linux-embedded-hal#82).
         let mut message = [0; MESSAGE];
         let Some(joined) = message.get_mut(..register.len() + data.len()) else {
@@ -114,22 +117,24 @@ impl<I: I2c> Registers<u16> for I2cRegisters<I> {
     }
 }
 
-/// Registers behind an SPI chip select, as Bosch's sensors do it: bit 7 of the address says read, and the other seven are the register's.
+/// Registers of a chip on SPI with the framing of Bosch's sensors: bit 7 of the first byte is set
+/// for a read, bits 0 to 6 are the register address.
 ///
-/// `DUMMY` bytes pass between the address of a read and its data: one with an inertial sensor (BMI270 data sheet §6, "SPI interface"), none
-/// with a barometer or a magnetometer (BMP280 data sheet §5.3, BMM150 data sheet, "SPI interface"). Other numbers do not compile.
+/// `DUMMY` is the number of bytes between the address of a read and its data: one on an inertial
+/// sensor (BMI270 data sheet §6, "SPI interface"), zero on a barometer or a magnetometer (BMP280
+/// data sheet §5.3, BMM150 data sheet, "SPI interface"). Other values do not compile.
 #[derive(Debug)]
 pub struct SpiRegisters<S, const DUMMY: usize = 1>(pub S);
 
 impl<S: SpiDevice, const DUMMY: usize> Registers for SpiRegisters<S, DUMMY> {
     type Error = S::Error;
     const LIMIT: TransferLimit = TransferLimit::SPI;
-    /// Small enough for the DMA buffers of small parts.
+    /// Fits the DMA buffers of small microcontrollers.
     const LONGEST_WRITE: usize = 256;
 
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), S::Error> {
         const { assert!(DUMMY < 2, "no chip has more than one") };
-        // A dummy byte is clocked in while a second byte is clocked out.
+        // The chip returns its dummy byte while the host sends this second byte.
         let command: &[u8] = if DUMMY == 0 { &[register | 0x80] } else { &[register | 0x80, 0] };
         self.0.transaction(&mut [spi::Operation::Write(command), spi::Operation::Read(into)]).await
     }
@@ -147,7 +152,8 @@ impl<S, const DUMMY: usize> Wires for SpiRegisters<S, DUMMY> {
     }
 }
 
-/// Registers and a clock: what a driver works with. Every transfer ends in bounded time.
+/// Register access together with a clock: the basis of a chip driver. Every transfer ends in
+/// bounded time.
 ///
 /// ```
 /// use embedded_hal_async::i2c::I2c;
@@ -172,17 +178,17 @@ pub struct Port<R, T> {
 }
 
 impl<R, T> Port<R, T> {
-    /// Registers, the clock that bounds their transfers, and how long one may take.
+    /// Combines register access with the clock that bounds its transfers and their time limit.
     pub const fn new(registers: R, clock: T, limit: TransferLimit) -> Self {
         Self { registers, clock, limit, standstill: Standstill::new() }
     }
 
-    /// Gives a transfer up after another time from now on.
+    /// Replaces the time limit for all following transfers.
     pub const fn limit_transfers(&mut self, limit: TransferLimit) {
         self.limit = limit;
     }
 
-    /// Gives the bus, or the device, and the clock back.
+    /// Returns the bus, or the SPI device, and the clock.
     pub fn release(self) -> (R::Bus, T)
     where
         R: Wires,
@@ -192,11 +198,12 @@ impl<R, T> Port<R, T> {
 }
 
 impl<R, T: Timebase> Port<R, T> {
-    /// Reads `N` bytes from a register on.
+    /// Reads `N` bytes, starting at a register.
     ///
     /// # Errors
-    /// [`ChipError::Bus`] when the bus refuses, [`ChipError::BusTimeout`] when it takes longer than the limit, [`ChipError::ClockStopped`]
-    /// when the clock took no notice of the waits before: so everything that polls ends.
+    /// [`ChipError::Bus`] when the bus reports an error, [`ChipError::BusTimeout`] when the
+    /// transfer takes longer than the limit, [`ChipError::ClockStopped`] when the clock has not
+    /// advanced during the preceding waits. The last one ends every polling loop that reads.
     pub async fn read<A, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>
     where
         R: Registers<A>,
@@ -207,10 +214,11 @@ impl<R, T: Timebase> Port<R, T> {
         Ok(bytes)
     }
 
-    /// Reads what will be believed until the next start, such as calibration: twice, and refuses it unless both agree.
+    /// Reads values that stay in use until the next start, such as calibration, twice, and
+    /// compares.
     ///
     /// # Errors
-    /// [`ChipError::Data`] when they do not, and those of [`read`](Self::read).
+    /// [`ChipError::Data`] when the two reads differ, and those of [`read`](Self::read).
     pub async fn read_twice<A: Copy, const N: usize>(&mut self, register: A) -> Result<[u8; N], ChipError<R::Error>>
     where
         R: Registers<A>,
@@ -219,7 +227,7 @@ impl<R, T: Timebase> Port<R, T> {
         if self.read(register).await? == first { Ok(first) } else { Err(ChipError::Data) }
     }
 
-    /// Writes from a register on, no more than [`Registers::LONGEST_WRITE`] at once.
+    /// Writes at most [`Registers::LONGEST_WRITE`] bytes, starting at a register.
     ///
     /// # Errors
     /// Those of [`read`](Self::read).
@@ -231,10 +239,10 @@ impl<R, T: Timebase> Port<R, T> {
         bounded(&mut self.clock, self.limit.of(data.len()), pin!(self.registers.write(register, data))).await
     }
 
-    /// For whoever waits again and again without a transfer in between.
+    /// Checks the clock in a loop that waits repeatedly without a transfer in between.
     ///
     /// # Errors
-    /// [`ChipError::ClockStopped`] when the clock took no notice of waits of 100 ms in all.
+    /// [`ChipError::ClockStopped`] when the clock has not advanced during waits of 100 ms in total.
     pub fn check_clock<E>(&mut self) -> Result<(), ChipError<E>> {
         if self.standstill.take() { Err(ChipError::ClockStopped) } else { Ok(()) }
     }
@@ -244,42 +252,46 @@ impl<R, T: Timebase> Port<R, T> {
         self.clock.now()
     }
 
-    /// Leaves the chip alone for so long.
+    /// Waits for `span` without a transfer.
     pub async fn wait(&mut self, span: Duration) {
         let instant = self.clock.now() + span;
         self.wait_until(instant).await;
     }
 
-    /// The outcome of a future, or `None` when it is not there at `instant`; it is dropped then.
+    /// Runs a future until `instant`. Drops it and returns `None` when it has not finished by then.
     pub async fn until<F: Future>(&mut self, instant: Instant, future: F) -> Option<F::Output> {
+        // Zero when `instant` has passed. The future is polled once in that case, too.
         let left = instant.since(self.now());
         within(&mut self.clock, left, pin!(future)).await
     }
 
-    /// Leaves the chip alone until then; returns at once when that has passed.
+    /// Waits until `instant` without a transfer; returns at once when `instant` has passed.
     pub async fn wait_until(&mut self, instant: Instant) {
         let left = instant.since(self.clock.now());
         if left > Duration::ZERO {
             sleep_until(&mut self.clock, instant).await;
+            // Only waits count: a transfer may take less than one tick of the clock.
             self.standstill.note(left, self.clock.now());
         }
     }
 }
 
 impl<I, T> Port<I2cRegisters<I>, T> {
-    /// Talks to another address from now on, for chips that move.
+    /// Uses another address for all following transfers, for chips whose address can be changed.
     pub const fn move_to(&mut self, address: u8) {
         self.registers.address = address;
     }
 }
 
-/// A transfer, given up after `limit`: for a driver whose chip has no registers that fit [`Registers`].
+/// Runs a transfer and gives it up after `limit`. For drivers of chips that do not fit
+/// [`Registers`].
 ///
-/// Hand it over pinned where memory is scarce: an `async fn` keeps room for what it is given beside what it makes of it, so each layer
-/// that passes a transfer on by value doubles its size.
+/// Pass the transfer pinned where memory is scarce: an `async fn` stores an argument passed by
+/// value twice, as the argument and as the local it is moved to, so each such layer doubles its
+/// size.
 ///
 /// # Errors
-/// [`ChipError::BusTimeout`] then, and [`ChipError::Bus`] when the transfer itself fails.
+/// [`ChipError::BusTimeout`] after `limit`, [`ChipError::Bus`] when the transfer itself fails.
 pub async fn bounded<T: Timebase, V, E>(
     clock: &mut T,
     limit: Duration,
@@ -288,11 +300,13 @@ pub async fn bounded<T: Timebase, V, E>(
     within(clock, limit, transfer).await.ok_or(ChipError::BusTimeout)?.map_err(ChipError::Bus)
 }
 
-/// The method of every driver on a port that changes how long a transfer may take; its port is in a field `port`.
+/// Defines `with_transfer_limit` for a driver whose [`Port`](crate::chip::Port) is in its field
+/// `port`.
 #[macro_export]
 macro_rules! transfer_limit {
     () => {
-        /// Gives up a transfer after this time instead of [`TransferLimit::I2C`] or [`TransferLimit::SPI`].
+        /// Gives up a transfer after this time instead of [`TransferLimit::I2C`] or
+        /// [`TransferLimit::SPI`].
         #[must_use]
         pub fn with_transfer_limit(mut self, limit: $crate::chip::TransferLimit) -> Self {
             self.port.limit_transfers(limit);
@@ -301,11 +315,12 @@ macro_rules! transfer_limit {
     };
 }
 
-/// The method of a driver on nothing but a port, in a field `port`, that gives bus and clock back.
+/// Defines `release` for a driver that owns only a [`Port`](crate::chip::Port), in its field
+/// `port`.
 #[macro_export]
 macro_rules! release {
     () => {
-        /// Takes the driver apart: the bus and the clock. The chip goes on measuring.
+        /// Takes the driver apart and returns the bus and the clock. The chip continues to measure.
         pub fn release(self) -> (R::Bus, T)
         where
             R: $crate::chip::Wires,

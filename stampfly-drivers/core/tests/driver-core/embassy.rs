@@ -1,6 +1,6 @@
-//! Embassy's clock on this PC: waits are as long as asked, and a transfer that hangs is given up.
+//! Embassy's clock on a PC: waits have the requested length, and a transfer that hangs is given up.
 
-// The clock's queue of timers wants one.
+// The clock's timer queue requires an implementation of critical sections.
 use critical_section as _;
 use embedded_hal_async::delay::DelayNs;
 use stampfly_driver_core::blocking::block_on;

@@ -1,4 +1,5 @@
-//! Buses, slots and clocks. `cargo test -p stampfly-driver-core --test driver-core slot` runs one file.
+//! Tests of buses, slots and clocks. `cargo test -p stampfly-driver-core --test driver-core slot`
+//! runs one file.
 
 #[cfg(feature = "embassy-time")]
 mod embassy;

@@ -1,4 +1,4 @@
-//! A bus of two open-drain lines and a device that was interrupted in every possible place.
+//! A bus of two open-drain lines, and a device that was interrupted at every possible point.
 
 use embedded_hal::digital::{ErrorKind, ErrorType, InputPin, OutputPin};
 use stampfly_driver_core::blocking::block_on;
@@ -8,12 +8,13 @@ use stampfly_types::Duration;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// A device that sends bytes until nobody acknowledges or a STOP comes.
+/// A device that sends bytes until an acknowledge is missing or a STOP arrives.
 #[derive(Default)]
 struct Bus {
     scl: bool,
     sda: bool,
-    /// The device: the bytes it sends again and again, and the next bit, 8 being the acknowledgement's.
+    /// State of the device: the byte that it sends repeatedly, and the next bit; 8 is the
+    /// acknowledge.
     sending: Option<(u8, u32)>,
     holds_clock: bool,
     holds_data: bool,
@@ -38,10 +39,11 @@ impl Bus {
             ((true, _), (false, data)) => {
                 if let Some((byte, bit)) = self.sending {
                     // At the end of the ninth clock: high was no acknowledgement.
+                    // A high level at the end of the ninth clock is a missing acknowledge.
                     self.sending = if bit == 8 && data { None } else { Some((byte, (bit + 1) % 9)) };
                 }
             }
-            // A STOP that gets through.
+            // A STOP that the device sees.
             ((true, false), (true, true)) => self.sending = None,
             _ => {}
         }

@@ -1,4 +1,4 @@
-//! Two devices on one bus in virtual time: who transfers when, and who waits.
+//! Two devices on one bus in virtual time: order of their transfers, and waits.
 
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::task::{Context, Poll, Wake, Waker};
 
-/// Virtual time in nanoseconds and what waits for it.
+/// Virtual time in nanoseconds, and its waiting futures.
 #[derive(Clone, Default)]
 struct Clock(Rc<Cell<u64>>, Rc<RefCell<Vec<u64>>>);
 
@@ -29,7 +29,7 @@ impl Clock {
         .await;
     }
 
-    /// Runs both to their ends, or until this instant.
+    /// Runs both futures to their ends, or until this instant.
     fn run<A, B>(
         &self,
         limit: Instant,
@@ -40,7 +40,7 @@ impl Clock {
         let (mut done, mut context) = ((None, None), Context::from_waker(Waker::noop()));
         while (done.0.is_none() || done.1.is_none()) && self.now() < limit {
             self.1.borrow_mut().clear();
-            // Twice: one may have set the other going.
+            // Twice, because one future may have woken the other.
             for _ in 0..2 {
                 if done.0.is_none()
                     && let Poll::Ready(value) = first.as_mut().poll(&mut context)
@@ -74,18 +74,18 @@ impl Timebase for Clock {
     }
 }
 
-/// What happened on the wires: who, from, to.
+/// Record of the transfers: device, start, end.
 #[derive(Clone, Default)]
 struct Wires(Rc<Cell<bool>>, Rc<RefCell<Vec<(char, u64, u64)>>>);
 
-/// A device whose transfers take as many microseconds as their first byte says.
+/// A device whose transfers take the number of microseconds given by their first byte.
 struct Device(char, Clock, Wires);
 
 impl ErrorType for Device {
     type Error = Infallible;
 }
 
-/// Ends a transfer that is dropped, as a peripheral's driver does.
+/// Ends a transfer that is dropped, as the driver of a peripheral does.
 struct Transfer<'a>(&'a Device, u64);
 
 impl Drop for Transfer<'_> {
@@ -137,7 +137,7 @@ impl Bench {
     }
 }
 
-/// A status and a FIFO read per period, for ever; the periods wander within the guard.
+/// A status read and a FIFO read per period, without end. The periods vary within the guard.
 async fn lead(mut device: Lead<'_, Device, Clock>, clock: Clock, late: impl Fn(u64) -> u64) {
     let mut due = clock.0.get();
     for round in 0.. {
@@ -149,7 +149,7 @@ async fn lead(mut device: Lead<'_, Device, Clock>, clock: Clock, late: impl Fn(u
     }
 }
 
-/// A burst every 10 ms of its own clock, which drifts against the lead's.
+/// A burst every 10 ms of its own clock, which drifts relative to the lead's.
 async fn guest(mut device: Guest<'_, Device, Clock>, clock: Clock, count: u32) -> Vec<u64> {
     let mut waits = Vec::new();
     for _ in 0..count {
@@ -163,7 +163,7 @@ async fn guest(mut device: Guest<'_, Device, Clock>, clock: Clock, count: u32) -
 
 #[test]
 fn a_lead_in_its_rhythm_never_waits_and_its_guest_not_long() {
-    // On time, 3 per cent late, wandering by up to the guard early.
+    // On time, 3 per cent late, early by a varying time up to the guard.
     let rhythms: [fn(u64) -> u64; 3] = [|_| 0, |_| 75, |round| round * 7_919 % 150];
     for late in rhythms {
         let bench = Bench::new();
@@ -177,7 +177,7 @@ fn a_lead_in_its_rhythm_never_waits_and_its_guest_not_long() {
         assert_eq!(bus.delays(), 0);
         let lead = bench.transfers('l');
         assert!(lead.iter().all(|(begun, ended)| matches!(ended - begun, 14 | 44)));
-        // Every transfer of the guest lies in a pause, and ends well before the lead's next.
+        // Every transfer of the guest is in a pause and ends well before the lead's next one.
         for (begun, ended) in bench.transfers('g') {
             let next = lead.iter().find(|transfer| transfer.0 >= begun).expect("the lead goes on");
             assert!(next.0 >= ended + 100, "{begun} to {ended}, {next:?}");
@@ -281,7 +281,8 @@ fn whoever_is_dropped_gives_the_bus_back() {
     let (imu, flow) = bench.devices();
     let (mut imu, mut flow, _) = slots.split(imu, flow, LONGEST);
     {
-        // The lead is silent, so the guest begins; both are dropped, one transferring, the other waiting for it.
+        // The lead is silent, so the guest begins. Both futures are dropped, the guest during its
+        // transfer and the lead while it waits for it.
         let both = async {
             let (mut first, mut second) = (pin!(flow.write(&[100])), pin!(imu.write(&[10])));
             let mut context = Context::from_waker(Waker::noop());
@@ -342,7 +343,7 @@ fn each_wakes_the_other_at_its_end() {
 
 #[test]
 fn a_clock_that_stands_still_keeps_nobody_from_the_bus() {
-    /// It is always the same time, and every delay is over.
+    /// A clock that stands still, with delays that return at once.
     #[derive(Clone)]
     struct Stopped(Rc<Cell<u32>>);
     impl DelayNs for Stopped {
@@ -369,7 +370,7 @@ fn a_clock_that_stands_still_keeps_nobody_from_the_bus() {
     let (mut lead, mut guest, _) = slots.split(Device, Device, Duration::from_micros(200));
     for _ in 0..10 {
         assert_eq!(stampfly_driver_core::blocking::block_on(lead.write(&[0])), Ok(()));
-        // A transfer takes no time, so it may be given up for being too long; but it ends.
+        // The transfer takes no time and may be given up as too long, but the call must return.
         let _ = stampfly_driver_core::blocking::block_on(guest.write(&[0]));
     }
 }

@@ -1,4 +1,5 @@
-//! The emulated chip under a driver that is none of this project's: [`mpu6000`](https://docs.rs/mpu6000), written for embedded-hal 0.2.
+//! The emulated chip under an independent driver: [`mpu6000`](https://docs.rs/mpu6000), written for
+//! embedded-hal 0.2.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -15,7 +16,8 @@ use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::Duration;
 use std::rc::Rc;
 
-/// Bus, chip select and delay of that time, of the port of ours: what is written stays until it is known what is read.
+/// Bus, chip select and delay of embedded-hal 0.2 on the port of this project. Writes are buffered
+/// until the length of the read is known.
 #[derive(Clone)]
 struct Old {
     port: Rc<RefCell<SpiPort<Mpu6000>>>,

@@ -1,4 +1,5 @@
-//! The MPU-6000 driver against the emulated chip: start, samples, faults of the bus, restarts, calls that are dropped.
+//! Tests of the MPU-6000 driver on the emulated chip: start, samples, bus faults, restarts, dropped
+//! calls.
 
 mod another_driver;
 
@@ -21,7 +22,7 @@ use std::rc::Rc;
 type Port = SpiPort<chips::Mpu6000>;
 type Driver = Mpu6000<Port, Clock, fn(&mut Port, BusClock)>;
 
-/// x of the chip to the right, y forward, z up.
+/// The chip's x axis points right, y forward, z up.
 const AXES: AxisMap = AxisMap::new(Axis::PlusY, Axis::PlusX, Axis::MinusZ).expect("a rotation");
 
 struct Bench {
@@ -195,7 +196,7 @@ fn a_chip_that_restarts_in_flight_says_so_once_and_its_zeros_are_no_sample() {
     }
 }
 
-/// A port that the test reaches as well.
+/// A port to which the test has access as well.
 #[derive(Clone)]
 struct Shared(Rc<RefCell<Port>>);
 
@@ -289,7 +290,7 @@ fn the_self_test_passes_and_fails_with_a_sensor_that_does_not_move() {
     bench.run(async |imu| imu.self_test().await).expect("a good chip");
     bench.attached.set_broken(true);
     let failed = bench.run(async |imu| imu.self_test().await);
-    // Its gyroscope's and accelerometer's zeros are told apart from nobody by its thermometer.
+    // The chip answers, but its proof masses do not respond.
     assert_eq!(failed, Err(ChipError::SelfTest));
     bench.attached.set_broken(false);
     bench.next().expect("set up again");
@@ -308,7 +309,7 @@ fn a_reader_that_comes_late_gets_the_newest_and_goes_on_from_there() {
     assert!((245..=255).contains(&next.at.since(late.at).as_micros()), "no catching up");
 }
 
-/// Polls a future so often, and drops it.
+/// Polls a future this number of times and drops it.
 fn drop_after<F: Future>(clock: &Clock, polls: usize, future: F) {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());

@@ -1,4 +1,5 @@
-//! The emulated chip under a driver that is none of this project's: [`nrf24-rs`](https://docs.rs/nrf24-rs), two of them, and one of it with one of ours.
+//! The emulated chip under an independent driver, [`nrf24-rs`](https://docs.rs/nrf24-rs): a link
+//! between two of them, and one with a driver of this project.
 
 use embedded_hal::spi::MODE_0;
 use nrf24_rs::Nrf24l01 as Theirs;
@@ -25,7 +26,7 @@ fn theirs(clock: &Clock, air: &Air) -> Theirs<SpiPort<Nrf24l01>, ChipEnable> {
         .data_rate(DataRate::R1Mbps)
         .pa_level(PALevel::Max)
         .crc_encoding_scheme(EncodingScheme::R2Bytes);
-    // It reads back CONFIG by itself.
+    // The driver reads CONFIG back.
     Theirs::new(port, enable, &mut clock.clone(), config).expect("it starts")
 }
 
@@ -68,7 +69,7 @@ fn through_lossy_air_acknowledgements_bring_most_of_it() {
     air.set_loss(0.3);
     let mut heard = 0;
     for number in 0..100_u8 {
-        // After what was given up it says so once, and empties its FIFO.
+        // After a packet it gave up, it reports that once and empties its FIFO.
         let _ = sender.write(&mut clock.clone(), &[number; 10]);
         wait(&clock, 30_000);
         let mut payload = [0; 10];

@@ -1,4 +1,5 @@
-//! The nRF24L01 driver against the emulated chip: start, packets, faults of the bus, restarts, calls that are dropped.
+//! Tests of the nRF24L01+ driver on the emulated chip: start, packets, bus faults, restarts,
+//! dropped calls.
 
 mod another_driver;
 mod hisky;
@@ -55,7 +56,7 @@ impl Bench {
         self.clock.advance_to(self.clock.now() + Duration::from_micros(micros));
     }
 
-    /// A receiver that has settled.
+    /// A receiver whose radio has settled.
     fn listening() -> Self {
         let mut bench = bench();
         bench.run(async |radio| radio.listen(TUNING).await).expect("it starts");
@@ -112,7 +113,7 @@ fn it_is_deaf_for_130_us_after_a_hop_and_hears_then() {
     for (micros, heard) in [(120, false), (131, true)] {
         let mut bench = Bench::listening();
         bench.run(async |radio| radio.listen(Tuning { channel: 41, ..TUNING }).await).expect("it hops");
-        // What the driver waited after CE is a part of it.
+        // The driver has already waited for 4 µs after CE.
         bench.wait(micros - 4);
         let span = bench.air.send(&AirPacket { channel: 41, ..PACKET });
         bench.wait(span.as_micros());
@@ -271,7 +272,7 @@ fn a_power_down_and_a_carrier() {
     assert_eq!(bench.receive(), Ok(Some(PAYLOAD)));
 }
 
-/// Polls a future so often, and drops it.
+/// Polls a future this number of times and drops it.
 fn drop_after<F: Future>(clock: &Clock, polls: usize, future: F) -> bool {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());

@@ -1,4 +1,4 @@
-//! The PMW3901 driver against a chip of banks of registers that insists on its pauses.
+//! Tests of the PMW3901 driver on a chip with register banks that enforces the minimum pauses.
 
 mod start_sequence;
 
@@ -13,26 +13,26 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// How the chip is turned, which looks down in any case: body = (y, −x) of the chip.
+/// Mounting of the chip, which always faces down: body = (y, −x) of the chip.
 const AXES: AxisMap = AxisMap::new(Axis::PlusY, Axis::MinusX, Axis::PlusZ).expect("a rotation");
 
 struct Chip {
     registers: BTreeMap<(u8, u8), u8>,
     bank: u8,
     writes: Vec<(u8, u8)>,
-    /// Counts not yet read.
+    /// Counts that have not been read.
     counts: [i16; 2],
     quality: u8,
     shutter: u8,
     absent: bool,
     fault: Option<Fault>,
-    /// Earliest next access.
+    /// Earliest time of the next access.
     ready: Instant,
-    /// How many more times register 0x47 says no.
+    /// Number of further reads of register 0x47 that return "not ready".
     refusals: u32,
-    /// A register that can be written only.
+    /// A register that is write-only.
     forgets_witness: bool,
-    /// The write of so many from now on arrives with another value.
+    /// Number of writes until one arrives with another value.
     garbles: Option<u32>,
 }
 
@@ -89,7 +89,7 @@ impl Chip {
                 self.refusals = self.refusals.saturating_sub(1);
             }
             (0, 0x4E) if self.forgets_witness => into[0] = 0,
-            // What was never written looks like no setting.
+            // A register that was never written has no valid setting.
             key => into[0] = self.registers.get(&key).copied().unwrap_or(0xEE),
         }
     }
@@ -209,7 +209,7 @@ fn every_count_is_delivered_once_in_body_axes_and_radians() {
         total[1] += sample.data.delta_y;
         chip.borrow_mut().counts = [2, -3];
     }
-    // What was counted before the first interval belongs to nobody; 99 reads carry (2, −3): body = (y, −x).
+    // Counts before the first interval are discarded; 99 reads carry (2, −3): body = (y, −x).
     assert!((total[0] + 99.0 * 3.0 * 0.00222).abs() < 1e-4, "{total:?}");
     assert!((total[1] + 99.0 * 2.0 * 0.00222).abs() < 1e-4, "{total:?}");
 }
@@ -274,7 +274,7 @@ fn a_chip_that_restarts_in_flight_is_noticed_within_a_second_and_set_up_again() 
     for _ in 0..150 {
         block_on(flow.next()).expect("a sample");
     }
-    // Back with its own values, and counting.
+    // Restarted with its default values, and counting.
     chip.borrow_mut().registers = Chip::new().registers;
     let begun = clock.now();
     let error = loop {

@@ -1,7 +1,8 @@
-//! The start of the PMW3901 as other people's drivers have it, value by value beside ours.
+//! Start sequences of four other PMW3901 drivers, compared with this one value by value.
 //!
-//! The performance registers are undocumented: PixArt's data sheet lists them and says nothing about them. So what a driver can be held
-//! to is what those who flew with the chip write. Read on 2026-11-26; numbers only.
+//! The performance registers are undocumented: PixArt's data sheet lists them without explanation.
+//! The only reference is what drivers write that have flown with the chip. Read on 2026-11-26;
+//! numbers only.
 //!
 //! | column | driver | file, at commit |
 //! |---|---|---|
@@ -10,21 +11,22 @@
 //! | 2 | Bitcraze's library for Arduino | `bitcraze/Bitcraze_PMW3901`, `src/Bitcraze_PMW3901.cpp`, 3ae7e5ce |
 //! | 3 | ArduPilot | `ArduPilot/ardupilot`, `AP_OpticalFlow_Pixart_SROM.h` 1b979bc9 and `AP_OpticalFlow_Pixart.cpp` 00adba28 |
 //!
-//! What they do besides: the calibration of the chip's own values at the beginning is in PX4's only. Crazyflie's ends with two more registers
-//! of bank 0, 0x5A = 0x10 and 0x54 = 0x00, which nobody else has. ArduPilot's reads each register back after its write, up to five times, and goes
-//! on when it never agrees; no other reads anything back. So nobody is known to depend on it, and our driver does not either: it takes a register that says
-//! the same other thing after two starts for one that cannot be read.
+//! Other differences: only PX4 reads the chip's own calibration at the beginning. Crazyflie's list
+//! ends with two more registers of bank 0, 0x5A = 0x10 and 0x54 = 0x00. ArduPilot reads each
+//! register back after its write, up to five times, and continues when the values never agree; the
+//! others do not read back. As no driver is known to depend on read-back, this one does not either:
+//! a register that reads the same other value after two starts counts as write-only.
 
 use stampfly_pmw3901::codec::{self, Step, register};
 
-/// Of a setting: its bank, its register, and what the four write.
+/// One setting: its bank, its register, and the values of the four drivers.
 type Row = (u8, u8, [u8; 4]);
 
 const fn all(bank: u8, register: u8, value: u8) -> Row {
     (bank, register, [value; 4])
 }
 
-/// In their order. The banks are the writes to 0x7F before each.
+/// In the order of the drivers. The banks are from the writes to 0x7F before each setting.
 const LIST: [Row; 56] = [
     all(0x00, 0x61, 0xAD),
     all(0x03, 0x40, 0x00),
@@ -84,12 +86,13 @@ const LIST: [Row; 56] = [
     all(0x00, 0x40, 0x80),
 ];
 
-/// Where they differ, and what we write.
+/// Settings on which the drivers differ, and the value that this driver writes.
 const DISPUTED: [(u8, u8, u8); 4] = [(0x00, 0x74, 0x1F), (0x14, 0x65, 0x67), (0x14, 0x63, 0x70), (0x15, 0x48, 0x48)];
-/// The row before which they pause, and for how long, ms.
+/// Row before which the drivers pause, and the length of the pause, ms.
 const PAUSE: (usize, [u8; 4]) = (46, [10, 10, 100, 100]);
 
-/// Our list as rows: bank, register, value; and the pauses with the number of the row that comes next.
+/// This driver's list as rows of bank, register and value, and its pauses with the index of the
+/// next row.
 fn ours() -> (Vec<(u8, u8, u8)>, Vec<(usize, u8)>) {
     let (mut rows, mut pauses, mut bank) = (Vec::new(), Vec::new(), 0);
     for step in codec::PERFORMANCE {
@@ -150,7 +153,8 @@ fn what_is_read_back_is_what_each_of_the_four_leaves_behind() {
 
 #[test]
 fn identities_and_reset_are_those_of_all() {
-    // Crazyflie and ArduPilot compare both identities; Bitcraze's library takes either, PX4 asks for the first.
+    // Crazyflie and ArduPilot compare both identifications, Bitcraze's library accepts either, PX4
+    // checks the first.
     assert_eq!((register::PRODUCT_ID, codec::PRODUCT), (0x00, 0x49));
     assert_eq!((register::INVERSE_PRODUCT_ID, !codec::PRODUCT), (0x5F, 0xB6));
     assert_eq!((register::POWER_UP_RESET, codec::RESET), (0x3A, 0x5A));
@@ -163,7 +167,8 @@ fn the_calibration_is_that_of_px4() {
     let second = [(0x7F, 0x00), (0x51, 0x7B), (0x50, 0x00), (0x55, 0x00), (0x7F, 0x0E)];
     assert_eq!(codec::PREPARE_CALIBRATION, second);
     assert_eq!(codec::BEFORE_CALIBRATION, [(0x7F, 0x00), (0x61, 0xAD), (0x51, 0x70), (0x7F, 0x0E)]);
-    // Up to 28 it adds 14, above that 11, and not above 63; of the other value it takes 45 %.
+    // Values up to 28 are raised by 14, larger ones by 11, limited to 63. The other value is scaled
+    // by 45 %.
     for (read, written) in [(0, 14), (28, 42), (29, 40), (52, 63), (53, 63), (244, 63)] {
         assert_eq!(codec::calibration(read, 0)[0], written, "{read}");
     }

@@ -1,4 +1,4 @@
-//! Two chips on one bus, each with a pin that keeps it in reset: registers, measurements in virtual time, faults.
+//! Two chips on one bus, each with a reset pin: registers, measurements in virtual time, faults.
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_hal_async::i2c::{self, I2c, Operation};
@@ -12,43 +12,45 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
 
-/// What the chip needs from the release of its reset.
+/// Time from the release of the reset until the chip answers, µs.
 pub const BOOT: u64 = 1_200;
 
 pub struct Chip {
     pub clock: Clock,
     pub registers: Vec<u8>,
-    /// Out of reset since.
+    /// Time since which it is out of reset.
     pub up: Option<u64>,
     pub address: u8,
-    /// Resets so far.
+    /// Number of resets.
     pub resets: u32,
-    /// Measuring since, period.
+    /// Start of ranging, and the period.
     pub ranging: Option<(u64, u64)>,
-    /// Measurements whose interrupt has been taken back.
+    /// Number of measurements whose interrupt has been cleared.
     pub cleared: u64,
     /// Measurements that have been read.
     pub read: Vec<u64>,
     pub identification: [u8; 2],
-    /// What the factory found to be missing, mm.
+    /// The factory's correction, mm.
     pub factory: i16,
-    /// Status code, distance in mm.
+    /// Status code, and distance in mm.
     pub target: (u8, i16),
     pub blind: bool,
     pub boots: bool,
-    /// How often the interrupt was looked at.
+    /// Number of reads of the interrupt status.
     pub looks: u32,
-    /// A bit that changes on the way to the ranging parts' registers.
+    /// A bit that is flipped in writes to the registers of the ranging parts.
     pub flip: u8,
-    /// The next clear of the interrupt is acknowledged and does nothing.
+    /// The next clear of the interrupt is acknowledged but has no effect.
     pub deaf: bool,
-    /// Until the interrupt is taken back the chip has this measurement and makes no other.
+    /// The measurement that the chip holds until the interrupt is cleared; it makes no other
+    /// meanwhile.
     pub held: Option<u64>,
-    /// Held in reset by its register, where it still answers, but says nothing.
+    /// Held in reset by its register: it still acknowledges but returns no data.
     pub held_by_register: bool,
-    /// The clock stands still once the register holds it.
+    /// The clock stands still once the register holds the chip.
     pub stops_clock: bool,
-    /// What its address is while and after the register holds it: the first again, or as it was.
+    /// Whether the chip keeps its address while the register holds it and afterwards, or returns to
+    /// the boot address.
     pub keeps_address: bool,
     /// Faults of the next accesses to a register.
     pub faults: Vec<(u16, Fault)>,
@@ -81,7 +83,7 @@ impl Chip {
         }
     }
 
-    /// What the register of the reset does.
+    /// Effect of the reset register.
     fn reset_by_register(&mut self, let_go: bool) {
         let address = self.address;
         if let_go && !self.held_by_register {
@@ -101,7 +103,7 @@ impl Chip {
         }
     }
 
-    /// What a loss of power does: everything forgotten, back at the first address.
+    /// Effect of a loss of power: all settings are lost, and the chip is back at the boot address.
     pub fn restart(&mut self) {
         self.registers.fill(0);
         self.registers[0x30] = 0x11;
@@ -109,13 +111,13 @@ impl Chip {
         self.up = self.up.map(|_| self.clock.now().as_micros());
     }
 
-    /// Finished measurements, and when the newest was.
+    /// Number of finished measurements, and the time of the newest one.
     pub fn measured(&self) -> (u64, u64) {
         if let Some(held) = self.held {
             return (held, 0);
         }
         let Some((begun, period)) = self.ranging.filter(|_| !self.blind) else { return (self.cleared, 0) };
-        // One budget of 33 ms for the first, then one per period.
+        // A budget of 33 ms for the first measurement, then one per period.
         let Some(since) = (self.clock.now().as_micros()).checked_sub(begun + 33_000) else { return (0, 0) };
         (1 + since / period, begun + 33_000 + since / period * period)
     }
@@ -255,7 +257,7 @@ impl Bench {
         })
     }
 
-    /// A driver of the first chip, which has no pin.
+    /// A driver of the first chip, without a pin.
     pub fn without_pin(&self, address: u8) -> Vl53l3cx<'_, Bus, NoXshut, Clock> {
         let bus = Bus(self.clock.clone(), self.chips.clone());
         Vl53l3cx::new(bus, NoXshut, &self.boot, address, self.clock.clone(), Config::default())

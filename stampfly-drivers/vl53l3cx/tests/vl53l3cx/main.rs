@@ -1,4 +1,5 @@
-//! The VL53L3CX driver against two chips on one bus: pins, addresses, a measurement that takes its time, and faults.
+//! Tests of the VL53L3CX driver on two chips on one bus: pins, addresses, measurements in virtual
+//! time, and faults.
 
 mod bench;
 mod neighbours;
@@ -118,11 +119,11 @@ fn the_same_measurement_is_never_delivered_twice_whatever_happens_to_its_end() {
     let bench = Bench::new();
     let [mut below, _] = bench.drivers();
     block_on(below.next()).expect("a sample");
-    // Read, but the chip was not told.
+    // The measurement was read, but the clear failed.
     bench.chips[0].borrow_mut().faults = vec![(0x86, Fault::Nack)];
     assert_eq!(block_on(below.next()), Err(ChipError::Bus(Fault::Nack)));
     block_on(below.next()).expect("a sample");
-    // Cancelled in the read-out.
+    // Dropped during the read.
     bench.clock.advance(34_000);
     bench.chips[0].borrow_mut().faults = vec![(0x89, Fault::Hang)];
     bench.clock.stop(true);

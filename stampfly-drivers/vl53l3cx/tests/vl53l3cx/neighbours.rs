@@ -1,4 +1,4 @@
-//! Two on a bus: who is moved when, and what one's restart means for the other.
+//! Two chips on a bus: their moves, and the effect of one chip's restart on the other.
 
 use super::bench::{Bench, Bus, Xshut};
 use stampfly_driver_core::blocking::block_on;
@@ -57,8 +57,8 @@ fn two_that_restart_together_sort_themselves_out() {
             chip.borrow_mut().restart();
         }
         bench.clock.advance(2_000);
-        // The emulated bus fails this test when both ever answer at once. They do until the first is in reset, so
-        // nobody may talk to the boot address before that.
+        // The emulated bus fails this test when both chips answer at the same time. They would
+        // until the first is in reset, so no driver may use the boot address before that.
         let outcomes: Vec<_> = (0..6).map(|turn| block_on(drivers[(first + turn) % 2].next())).collect();
         assert_eq!(outcomes[0], Err(ChipError::Restarted));
         assert_eq!(outcomes[1], Err(ChipError::Restarted));
@@ -84,7 +84,7 @@ fn a_start_that_is_cancelled_leaves_the_boot_address_free() {
 #[test]
 fn a_driver_that_exists_holds_its_chip_in_reset() {
     let bench = Bench::new();
-    // Somebody who forgets the second sensor finds it at the boot address.
+    // If no driver is created for the second sensor, that sensor is found at the boot address.
     let bus = Bus(bench.clock.clone(), bench.chips.clone());
     let pin = Xshut(bench.chips[0].clone());
     let mut below = Vl53l3cx::new(bus, pin, &bench.boot, 0x30, bench.clock.clone(), Config::default());

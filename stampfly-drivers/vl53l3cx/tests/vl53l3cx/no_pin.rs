@@ -1,11 +1,11 @@
-//! A chip on a board that does not wire XSHUT.
+//! A chip on a board that does not connect XSHUT.
 
 use crate::bench::{Bench, Xshut};
 use stampfly_driver_core::blocking::block_on;
 use stampfly_driver_fakes::closure::{Fault, cancel};
 use stampfly_vl53l3cx::{BootAddress, ChipError, Config, RangeFinder, Timebase, Vl53l3cx};
 
-/// Where chip and driver agree to be: at the first address, at another, and after a reset at either.
+/// Addresses of chip and driver: at the boot address, at another one, and after a reset at either.
 const CASES: [(u8, u8, bool); 6] = [
     (0x29, 0x29, false),
     (0x29, 0x30, false),
@@ -55,7 +55,7 @@ fn one_that_lost_its_power_is_found_again() {
 fn a_start_dropped_while_the_chip_stands_still_leaves_it_to_the_next() {
     let bench = alone();
     let mut sensor = bench.without_pin(0x30);
-    // Waits end but for the pause of the reset.
+    // Delays return, except for the pause of the reset.
     bench.chips[0].borrow_mut().stops_clock = true;
     cancel(sensor.start());
     assert!(bench.chips[0].borrow().held_by_register);
@@ -89,7 +89,7 @@ fn a_neighbour_that_came_back_at_the_first_address_is_not_met_there() {
     let mut sensor = bench.without_pin(0x30);
     assert_eq!(block_on(sensor.start()), Err(ChipError::AddressTaken));
     assert_eq!(bench.chips[0].borrow().resets, 0);
-    // Its own driver takes it away.
+    // The neighbour's own driver moves it away.
     let mut neighbour = Vl53l3cx::new(
         crate::bench::Bus(bench.clock.clone(), bench.chips.clone()),
         Xshut(bench.chips[1].clone()),

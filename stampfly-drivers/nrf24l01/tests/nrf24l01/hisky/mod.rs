@@ -1,4 +1,5 @@
-//! HiSKY from end to end: a transmitter of its own code, the air, an emulated radio, its driver, and the protocol's receiver.
+//! HiSKY end to end: an independent transmitter, the air, an emulated radio, its driver, and the
+//! receiver of the protocol.
 
 mod receiver;
 mod transmitter;
@@ -10,7 +11,7 @@ use stampfly_types::{Duration, Instant};
 use transmitter::{Identity, sticks, sticks_packet};
 
 const ID: u32 = 0x1234_5678;
-/// After power-on and a start, and the longest search.
+/// Time after power-on, start and the longest search, ms.
 const SETTLED: u64 = 1_000;
 
 fn vectors() -> Value {
@@ -65,7 +66,8 @@ fn without_loss_every_packet_arrives_as_it_was_sent_111_times_a_second() {
     }
 }
 
-/// How control at 50 Hz fares: at every 20 ms, is the newest packet younger than this? Shares.
+/// Freshness of the packets for a control loop at 50 Hz: shares of the 20 ms steps at which the
+/// newest packet is younger than a limit.
 struct Freshness {
     in_20_ms: f64,
     in_40_ms: f64,
@@ -122,7 +124,7 @@ fn a_jammed_channel_costs_one_packet_of_twenty() {
     }
 }
 
-/// From power-on of the transmitter to its first packet that is heard.
+/// Time from power-on of the transmitter to its first packet that is received.
 #[test]
 fn it_is_found_however_far_out_of_phase() {
     let mut slowest = Duration::ZERO;
@@ -155,7 +157,8 @@ fn a_transmitter_whose_clock_is_off_by_0_4_percent_is_followed_through_an_outage
     }
 }
 
-/// Offline 1.0 s after the last packet was on the air: not before, and not later than the poll and the read take.
+/// The receiver is offline 1.0 s after the last packet was on the air, within the time of a poll
+/// and a read.
 #[test]
 fn it_is_offline_a_second_after_the_last_packet() {
     for wired in [false, true] {
@@ -171,7 +174,8 @@ fn it_is_offline_a_second_after_the_last_packet() {
         }
         let offline = link.clock.now().since(last).as_micros();
         assert!((1_000_000..=1_000_010).contains(&offline), "{offline}");
-        // The stamp itself: the end of the packet on the air, and a poll of 100 µs at most, or an interrupt.
+        // Error of the stamp: at most the poll period of 100 µs after the end of the packet, or an
+        // interrupt.
         let sent = link.knobs.last_sent.get();
         let late = last.since(sent).as_micros();
         println!("known {late} µs after the packet began, of which 144 are the packet, interrupt wired: {wired}");
@@ -206,7 +210,8 @@ fn it_binds_through_loss_within_the_nine_seconds() {
 #[test]
 fn packets_in_another_order_are_waited_for_and_another_sum_binds_nobody() {
     let mut link = Link::new(ID, false, Instant::from_millis(200), 1, false);
-    // 0 3 2 1: after the first one only 1 counts, in the next round only 2, and in the third 3.
+    // Order 0 3 2 1: after packet 0 only 1 is accepted, in the next round only 2, and in the third
+    // 3.
     link.knobs.order.set([0, 3, 2, 1]);
     for (round, bound) in [(1, false), (2, false), (3, true)] {
         link.knobs.binds.set(4);
@@ -214,7 +219,7 @@ fn packets_in_another_order_are_waited_for_and_another_sum_binds_nobody() {
         assert_eq!(link.hisky.borrow().bound.is_some(), bound, "round {round}");
     }
     assert_eq!(link.hisky.borrow().bound.expect("bound").hops, link.identity.hops, "each in its place");
-    // Without the first one, and with a sum that is another's.
+    // Without packet 0, and with a wrong checksum.
     let mut link = Link::new(ID, false, Instant::from_millis(200), 1, false);
     link.knobs.binds.set(10_000);
     link.knobs.order.set([3, 3, 2, 1]);
@@ -240,9 +245,9 @@ fn an_armed_vehicle_refuses_to_bind_and_goes_on_with_its_pilot() {
     link.run(5_000);
     let before = link.heard();
     link.run(1_000);
-    // Two transmitters on some channels at the same time: some packets collide.
+    // Two transmitters that share some channels: some packets collide.
     assert!(link.heard() - before > 100 && link.hisky.borrow().bound.is_none());
-    // Disarmed, and asked: it takes the other one.
+    // Disarmed and requested to bind, the receiver accepts the other transmitter.
     link.hisky.borrow_mut().receiver.set_armed(false);
     link.hisky.borrow_mut().receiver.start_binding().expect("disarmed");
     link.run(200);

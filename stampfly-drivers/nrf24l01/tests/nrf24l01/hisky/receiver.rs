@@ -1,4 +1,4 @@
-//! The task of a receiver: the protocol, the radio's driver, and what a vehicle takes of it.
+//! Task of a receiver: the protocol, the radio driver, and the vehicle's use of them.
 
 use super::transmitter::{Identity, Knobs, transmit};
 use core::convert::Infallible;
@@ -14,18 +14,18 @@ use stampfly_types::{Duration, Instant};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// The protocol's receiver on the radio: one line a method.
+/// The receiver of the protocol as a `Hopper`, one line per method.
 #[derive(Debug)]
 pub struct Hisky {
     pub receiver: HiskyReceiver,
-    /// All packets of sticks, with the instant they were known.
+    /// All stick packets, with the time at which they were received.
     pub heard: Vec<(Instant, HiskyChannels)>,
     pub bound: Option<HiskyLink>,
-    /// Errors of the radio.
+    /// Number of errors of the radio.
     pub errors: u32,
 }
 
-/// The receiver, which the tests look at meanwhile.
+/// The receiver, shared with the test.
 struct Shared(Rc<RefCell<Hisky>>);
 
 impl Hopper<10> for Shared {
@@ -52,12 +52,12 @@ impl Hopper<10> for Shared {
     }
 }
 
-/// How long a step waits at most: the receiver looks up that often.
+/// Longest wait of a step.
 const STEP: Duration = Duration::from_millis(10);
 
 type Radio<P> = Nrf24l01<SpiPort<chips::Nrf24l01>, ChipEnable, Clock, P, 10>;
 
-/// The receiver's task.
+/// Task of the receiver.
 async fn receive<P: Wait>(mut radio: Radio<P>, clock: Clock, hisky: Rc<RefCell<Hisky>>) {
     let mut hopper = Shared(hisky.clone());
     loop {
@@ -69,7 +69,7 @@ async fn receive<P: Wait>(mut radio: Radio<P>, clock: Clock, hisky: Rc<RefCell<H
     }
 }
 
-/// A vehicle's radio and a transmitter in the same air.
+/// A vehicle's radio and a transmitter that share the air.
 pub struct Link {
     pub clock: Clock,
     pub air: Air,
@@ -81,7 +81,7 @@ pub struct Link {
 }
 
 impl Link {
-    /// A receiver that is switched on at zero, and a transmitter that is at `from`.
+    /// A receiver that is switched on at zero, and a transmitter that is switched on at `from`.
     pub fn new(id: u32, bound: bool, from: Instant, seed: u64, wired: bool) -> Self {
         Self::wired(id, bound, from, seed, |pin| wired.then_some(pin))
     }
@@ -121,12 +121,12 @@ impl Link {
         self.tasks.run_until(self.clock.now() + Duration::from_micros(micros));
     }
 
-    /// With an interrupt whose wire is broken, or at ground.
+    /// With an interrupt pin that is disconnected or shorted to ground.
     pub fn broken_pin(id: u32, stuck_low: bool) -> Self {
         Self::wired(id, true, Instant::from_millis(50), 1, |_| Some(Stuck(stuck_low)))
     }
 
-    /// Packets of sticks so far.
+    /// Number of stick packets so far.
     pub fn heard(&self) -> usize {
         self.hisky.borrow().heard.len()
     }
@@ -135,7 +135,7 @@ impl Link {
         self.hisky.borrow().receiver.is_offline(self.clock.now())
     }
 
-    /// Another transmitter in the same air.
+    /// Adds another transmitter.
     pub fn join(&mut self, id: u32) -> Knobs {
         let knobs = Knobs::default();
         let from = self.clock.now() + Duration::from_micros(4_321);
@@ -144,7 +144,7 @@ impl Link {
     }
 }
 
-/// A pin that says the same for ever.
+/// A pin that never changes.
 pub struct Stuck(bool);
 
 impl ErrorType for Stuck {

@@ -1,5 +1,5 @@
-//! A HiSKY transmitter, from what is known of public ones and none of this project's code: 9 phases of 1 ms, a way from an id to an address and
-//! channels, bind packets, sticks.
+//! A HiSKY transmitter, implemented from public transmitters and independent of the code of this
+//! project: 9 phases of 1 ms, a mapping from an id to address and channels, bind packets, sticks.
 
 use stampfly_sim::chips::{Air, AirPacket, AirRate};
 use stampfly_sim::time::Clock;
@@ -10,7 +10,7 @@ use std::rc::Rc;
 const PHASE: Duration = Duration::from_millis(1);
 const BIND: [u8; 5] = [0x12, 0x23, 0x23, 0x45, 0x78];
 
-/// What it is: address and channels.
+/// Identity of a transmitter: address and channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
     pub address: [u8; 5],
@@ -18,7 +18,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// As one public transmitter makes it of its id.
+    /// The identity that one public transmitter derives from its id.
     pub fn of(id: u32) -> Self {
         let [a, b, c, d] = id.to_be_bytes();
         let mut hops = Vec::<u8>::new();
@@ -40,7 +40,7 @@ impl Identity {
         Self { address: [a, b, c, d, c & 0xF0 | d & 0x0F], hops: hops.try_into().expect("twenty") }
     }
 
-    /// The packet of this number, of the four with which it binds.
+    /// One of the four packets with which it binds.
     pub fn bind_packet(&self, number: usize) -> [u8; 10] {
         let sum = self.address.iter().map(|byte| u16::from(*byte)).sum::<u16>();
         let mut packet = [0; 10];
@@ -58,7 +58,7 @@ impl Identity {
     }
 }
 
-/// Sticks as they are on the wire.
+/// A stick packet in the format of the air link.
 pub fn sticks_packet(sticks: [u16; 8]) -> [u8; 10] {
     let mut packet = [0; 10];
     for (place, stick) in sticks.into_iter().enumerate() {
@@ -68,31 +68,32 @@ pub fn sticks_packet(sticks: [u16; 8]) -> [u8; 10] {
     packet
 }
 
-/// What it sends in its frame of this number: every one is different from its neighbours.
+/// Stick positions of a frame, different from those of the adjacent frames.
 pub fn sticks(frame: u32) -> [u16; 8] {
     core::array::from_fn(|place| ((u64::from(frame) * 37 + place as u64 * 101) % 1_001) as u16)
 }
 
-/// What a test changes while it runs. Clones are the same.
+/// State that a test changes during a run. Clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Knobs {
-    /// The number of bind packets that are left.
+    /// Number of remaining bind packets.
     pub binds: Rc<Cell<u32>>,
-    /// It is switched off.
+    /// The transmitter is switched off.
     pub silent: Rc<Cell<bool>>,
-    /// The order in which it sends the bind packets.
+    /// Order of the bind packets.
     pub order: Rc<Cell<[usize; 4]>>,
-    /// Changes a byte of the sum of its bind packets.
+    /// Corrupts a byte of the checksum in the bind packets.
     pub wrong_sum: Rc<Cell<bool>>,
-    /// Frames so far.
+    /// Number of frames so far.
     pub frames: Rc<Cell<u32>>,
-    /// When its last packet of sticks began.
+    /// Start of the last stick packet.
     pub last_sent: Rc<Cell<Instant>>,
-    /// Its clock is off by so many parts of a million.
+    /// Error of its clock, parts per million.
     pub drift: Rc<Cell<i64>>,
 }
 
-/// Runs it from an instant on. Phase 3: a bind packet, while it binds; phase 6: channel and address of the sticks; phase 9: sticks.
+/// Runs the transmitter from an instant on. Phase 3: a bind packet, while it binds. Phase 6: change
+/// to the channel and address of the sticks. Phase 9: a stick packet.
 pub async fn transmit(clock: Clock, air: Air, identity: Identity, from: Instant, knobs: Knobs) {
     if knobs.order.get() == [0; 4] {
         knobs.order.set([0, 1, 2, 3]);
