@@ -41,18 +41,6 @@ struct Kind {
 fn kinds() -> Vec<Kind> {
     // A second of a flight.
     let second = Hop::fly(&Setup { limit: Simulated::from_secs(1), ..hop(1, None) });
-    let log_header = "timestamp_ms,dt_ms,raw_accel_x,raw_accel_y,raw_accel_z,raw_gyro_x,raw_gyro_y,raw_gyro_z,\
-        raw_baro_alt,raw_tof,raw_flow_squal,raw_flow_dx,raw_flow_dy,dev_pos_x,dev_pos_y,dev_pos_z,dev_vel_x,\
-        dev_vel_y,dev_vel_z,dev_roll_deg,dev_pitch_deg,dev_yaw_deg";
-    let log_row = |n: usize| format!("{},10.0,0.0{n},0.1,-9.8,0,0,0,28.8,0.037,136,0,1{}\n", n * 11, ",0".repeat(9));
-    let capture = |n: usize| format!("{},0,0,0.0{},0,0,-9.81\n", n * 10, n % 7);
-    let px4 = |n: usize| format!("{},imu,0,0,-0.098,0,0,0,10000,10000\n", n * 10_000);
-    let sensors = format!("{log_header}\n{}", (1..60).map(log_row).collect::<String>());
-    let capture = format!(
-        "timestamp_ms,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n{}",
-        (0..100).map(capture).collect::<String>()
-    );
-    let px4 = (1..100).map(px4).collect::<String>();
     let mission = "arm\ntakeoff 0.4\nhover 2\ngoto 0.5 -0.3 0.6 yaw 60\nland\n".repeat(20);
     let stick_row = |n: usize| format!("{:.2},0.6,0.{},-0.25,0,stabilize,1\n", n as f32 * 0.02, n % 10);
     let sticks = format!("t,throttle,roll,pitch,yaw,mode,arm\n{}", (0..100).map(stick_row).collect::<String>());
@@ -72,9 +60,6 @@ fn kinds() -> Vec<Kind> {
         // No file has so many rows.
         kind("flights of a campaign", &flights(), "fly --from FILE --row 9999"),
         kind("key", "0123456789abcdef".repeat(4).as_bytes(), "key mavlink FILE"),
-        kind("sensor log", sensors.as_bytes(), "estimate FILE"),
-        kind("flight capture", capture.as_bytes(), "estimate FILE"),
-        kind("PX4 replay", px4.as_bytes(), "estimate FILE"),
     ]
 }
 
