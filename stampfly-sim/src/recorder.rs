@@ -51,11 +51,11 @@ pub fn head<V: Vehicle, S: Sink>(
 /// Wall-clock run time of one runnable over a flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timing {
-    /// Activations.
+    /// Number of activations.
     pub count: u64,
-    /// Sum, ns.
+    /// Total time, ns.
     pub total_ns: u64,
-    /// Longest, ns.
+    /// Longest time, ns.
     pub longest_ns: u64,
 }
 

@@ -97,11 +97,11 @@ impl Eye {
 /// Stick response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
-    /// Lean forward and to the right, in units of gravity.
+    /// Tilt forward and to the right, in units of gravity.
     pub lean: [f32; 2],
-    /// Throttle beside the one that hovers, a share.
+    /// Throttle relative to hover, as a share of the full range.
     pub throttle: f32,
-    /// How far to turn clockwise, rad.
+    /// Angle to turn clockwise, rad.
     pub turn: f32,
 }
 
@@ -153,18 +153,18 @@ pub struct Places(pub Vec<Leg>);
 pub struct Leg {
     /// World NED, from where it stood, m.
     pub place: Vec3,
-    /// s.
+    /// Time to stay, s.
     pub stay: f32,
 }
 
 /// Progress of a mission, shared with an observer.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Legs that were flown.
+    /// Legs flown.
     pub legs: Cell<usize>,
-    /// Is it at a place, flying?
+    /// Holding a position in the air.
     pub stays: Cell<bool>,
-    /// It is over.
+    /// The mission is over.
     pub finished: Cell<bool>,
 }
 

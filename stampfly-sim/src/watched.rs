@@ -136,13 +136,13 @@ pub struct Watched<M> {
 /// The first crash of a flight. Ground contact after the motors stopped in the air is not one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crash {
-    /// When.
+    /// Instant of the crash.
     pub at: Instant,
     /// Speed at the touch, m/s.
     pub speed: f32,
-    /// Something touched that does not carry it: no wheel and no foot.
+    /// A part that does not carry the vehicle touched the ground: neither wheel nor foot.
     pub scraped: bool,
-    /// How long its motors were still told to turn, the last time that they were.
+    /// Time from the crash to the last look at which the motors were commanded to turn.
     pub turned: Duration,
 }
 
