@@ -41,7 +41,7 @@ const LEAN: f32 = 0.4;
 /// One observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// World NED, from where it stood, m.
+    /// World NED, relative to the start, m.
     pub position: Vec3,
     /// World NED, m/s.
     pub velocity: Vec3,
@@ -151,7 +151,7 @@ pub struct Places(pub Vec<Leg>);
 /// A position and the time to stay there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
-    /// World NED, from where it stood, m.
+    /// World NED, relative to the start, m.
     pub place: Vec3,
     /// Time to stay, s.
     pub stay: f32,

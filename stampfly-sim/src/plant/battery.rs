@@ -140,8 +140,9 @@ impl Battery {
     pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
         let source = self.open_circuit - self.polarisation - self.resistance * idle;
         let (mut voltage, mut drew) = (source, usize::MAX);
-        // Linear for the loads that draw. Without one that does not the voltage is lower, so that
-        // none comes back: as many that draw are the same ones, and no more passes than loads.
+        // The circuit is linear for the loads that conduct. Dropping loads that do not conduct lowers
+        // the voltage, so a dropped load never returns: the count stays the same after at most one
+        // pass per load, and the loop ends.
         loop {
             let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
             let (count, conductance, back) = drawing

@@ -125,7 +125,7 @@ impl Ground {
         1.0 + self.effect_gain * libm::exp(-height.max(0.0) / self.effect_height)
     }
 
-    /// Force (world) and torque (body) of the floor on the vehicle.
+    /// Force (world) and torque (body) of floor, ceiling and walls on the vehicle.
     pub(crate) fn push(
         &mut self,
         position: &Vector3<f64>,

@@ -23,7 +23,7 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// With this time constant, s, and this step, s; `None` without a lag.
+    /// A lag with this time constant and step, s; `None` for a time constant of 0.
     pub fn new(seconds: f64, dt: f64) -> Option<Self> {
         (seconds > 0.0).then(|| Self { share: 1.0 - libm::exp(-dt / seconds), mean: None })
     }

@@ -70,7 +70,7 @@ pub struct Pose {
     pub attitude: UnitQuaternion<f64>,
     /// Body FRD, rad/s.
     pub rate: Vector3<f64>,
-    /// Rotor speeds in units of hover speed: 1 for a start in the air.
+    /// Rotor speeds relative to hover speed: 1 for a start in the air.
     pub rotors: f64,
 }
 
