@@ -148,7 +148,7 @@ pub struct Ground<H> {
     faults: Injector,
     /// Number of the last event reported to pages.
     told: u32,
-    /// Who commands, as pages were told last.
+    /// The commander last reported to pages.
     commander: Option<Option<Seat>>,
     /// Page requests not yet confirmed.
     waits: Vec<(Client, Asked, Waited)>,
@@ -233,11 +233,11 @@ impl<H: Hands> Ground<H> {
                 if is_full && deed.is_some_and(|deed| !deed.ends_a_flight()) {
                     return put(&from, asked.answered(Err(TOO_MANY.into())).as_bytes());
                 }
-                // Before the vehicle is asked: its refusals are counted.
+                // Before the request is passed on, because the vehicle's refusals count from here.
                 let waited = deed.map(|deed| Waited::new(now, deed, &self.seated(samples)));
                 let answer = self.page(now, page(&from), &asked.ask, samples, console);
                 match waited {
-                    // Answered when it is seen to have happened.
+                    // Answered when the vehicle has visibly carried it out.
                     Some(waited) if answer.is_ok() => {
                         if is_full {
                             let (client, asked, _) = self.waits.remove(0);

@@ -76,11 +76,11 @@ pub enum Direction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// Forward.
+    /// About the forward axis.
     Roll,
-    /// Right.
+    /// About the right axis.
     Pitch,
-    /// Down.
+    /// About the down axis.
     Yaw,
 }
 

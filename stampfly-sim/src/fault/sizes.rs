@@ -132,7 +132,7 @@ mod tests {
         let [low, high] = [0.01f64, 10.0];
         let mut noise = Noise::new(1, 1);
         let small = (0..DRAWS).filter(|_| low + (high - low) * noise.unit() < 0.1).count();
-        // The rounded reciprocal of a size may lie slightly outside the range.
+        // The smallest third of the decades holds less than a hundredth of a uniform draw.
         assert!(small < DRAWS / 50, "{small}");
     }
 
@@ -142,7 +142,7 @@ mod tests {
         for measure in [Measure::Number, Measure::EitherWay, Measure::BelowOne, Measure::Times] {
             let sizes = sizes(measure, if measure == Measure::Times { [1.1, 3.0] } else { [0.1, 1.0] });
             let numbers: Vec<_> = (0..500).map(|_| sizes.draw(&mut noise)).collect();
-            // A reciprocal is rounded to three digits once more.
+            // The rounded reciprocal of a size may lie slightly outside the range.
             let [low, high] = [sizes.range[0] * 0.99, sizes.range[1] * 1.01];
             let outside = numbers.iter().find(|number| !(low..=high).contains(&measure.size(**number)));
             assert_eq!(outside, None, "{measure:?}");

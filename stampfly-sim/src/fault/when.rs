@@ -38,7 +38,7 @@ pub enum Moment {
 }
 
 impl Moment {
-    /// Every moment, in the order of a flight.
+    /// All moments in the order of a flight.
     pub const ALL: [Self; 12] = [
         Self::Calibration,
         Self::Ground,

@@ -66,7 +66,7 @@ fn patch(flying: &mut Value, old: &Value, new: &Value) -> Result<usize, ChangeEr
     }
     match (old, new) {
         (Value::Array(olds), Value::Array(news)) if olds.len() == news.len() => {
-            // A list that has grown since is a state.
+            // A list whose length has changed since power-on is a state.
             let Value::Array(parts) = flying else { return Ok(0) };
             if parts.len() != olds.len() {
                 return Ok(0);

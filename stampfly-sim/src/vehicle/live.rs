@@ -335,9 +335,9 @@ impl<'s> Pace<'s> {
     }
 }
 
-/// Greatest delay that later ticks make up for. A busy machine runs a thread late by tens of
-/// milliseconds, and stations count on from the vehicle's clock. Ticks that catch up hear no new
-/// sticks, so all of them together stay below the 500 ms after which vehicles call a link silent.
+/// Greatest delay that later ticks catch up. A busy machine delays a thread by tens of milliseconds,
+/// and stations extrapolate the vehicle's clock. No new sticks are received while catching up, so
+/// the limit is below the 500 ms after which vehicles declare a link lost.
 const MADE_UP: std::time::Duration = std::time::Duration::from_millis(250);
 
 /// Instant of the next tick: one period after the last, or now if that is more than [`MADE_UP`]

@@ -34,7 +34,7 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// A room of this side, m, with a vehicle of this weight, N.
+    /// A room with this side, m, and a vehicle of this weight, N.
     pub fn new(side: f64, weight: f64, mut noise: Noise) -> Self {
         let deviation = (weight / DENSITY).sqrt() / side;
         let swirl = noise.normal3();
