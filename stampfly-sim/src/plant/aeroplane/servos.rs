@@ -18,7 +18,7 @@ pub enum Surface {
     Elevator = 2,
     /// Positive with the trailing edge left; turns the nose wheel as well.
     Rudder = 3,
-    /// Both of them, positive with the trailing edge down. They do not go up.
+    /// Both flaps, positive with the trailing edge down; they do not deflect upwards.
     Flaps = 4,
     /// Brakes of the main wheels, 0 to 1; not a surface, but moved by a servo.
     Brake = 5,

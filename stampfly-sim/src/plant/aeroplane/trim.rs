@@ -13,9 +13,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TrimError {
-    /// The wing cannot carry it at this airspeed.
+    /// The wing cannot carry the aeroplane at this airspeed.
     TooSlow,
-    /// The elevator or the ailerons do not reach.
+    /// The control surfaces do not reach far enough.
     OutOfReach,
     /// The thrust is outside the propeller's range.
     Thrust,
