@@ -49,9 +49,9 @@ pub enum Flaw {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Nonsense {
-    /// Its interrupt never comes.
+    /// No interrupt comes.
     Silent,
-    /// No measurement succeeds: there is no bias voltage for the detector.
+    /// Every measurement fails: the detector has no bias voltage.
     Failing,
     /// The same distance every time.
     Frozen,
@@ -62,7 +62,7 @@ pub enum Nonsense {
 }
 
 impl Flaw {
-    /// A vector of the body as a chip with this flaw is exposed to it.
+    /// A vector of the body in the axes of a chip with this flaw.
     pub(super) fn turn(flaw: Option<Self>, body: [f64; 3]) -> [f64; 3] {
         let Some(Self::Mounting(rows)) = flaw else { return body };
         rows.map(|row| row.iter().zip(body).map(|(factor, part)| f64::from(*factor) * part).sum())

@@ -139,11 +139,11 @@ pub trait SpiChip: Chip {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BusError {
-    /// Nobody acknowledged the address or a data byte. I²C only.
+    /// The address or a data byte was not acknowledged. I²C only.
     NoAcknowledge(NoAcknowledgeSource),
-    /// The data line is held low by a chip, so no start condition can be made. I²C only.
+    /// A chip holds the data line low, so no start condition is possible. I²C only.
     ArbitrationLost,
-    /// The processor's controller lost bytes. SPI only.
+    /// The processor's controller has lost bytes. SPI only.
     Overrun,
 }
 
@@ -178,8 +178,7 @@ impl hal_spi::Error for BusError {
     }
 }
 
-/// An instant `nanoseconds` after `start`, counted in whole microseconds like everything on the
-/// virtual clock.
+/// The instant `nanoseconds` after `start`, rounded down to microseconds, the clock's resolution.
 fn after(start: Instant, nanoseconds: u64) -> Instant {
     start + Duration::from_micros(nanoseconds / 1_000)
 }

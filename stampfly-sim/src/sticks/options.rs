@@ -16,8 +16,9 @@ const HEIGHTS: [f32; 2] = [0.3, 20.0];
 const HOVER: f32 = 0.9;
 /// Throttle below which the stick counts as lowest, with a margin for trim and noise.
 const LOWEST: f32 = -0.9;
-/// A recording that begins on the ground has its throttle there for this long: many begin with the
-/// arming, a moment before the throttle is raised. A vehicle that is flown does not begin to fall.
+/// Time of lowest throttle that identifies a recording that begins on the ground. Many recordings
+/// begin with arming, shortly before the throttle is raised; in flight no recording begins with a
+/// fall.
 const LOW_FOR: Duration = Duration::from_millis(100);
 /// Option value for a hover throttle measured in the file.
 const MEDIAN: &str = "median";
