@@ -524,7 +524,7 @@ impl Chip for Vl53l3cx {
                     _ => None,
                 };
             }
-            // What the chip found and what it is cannot be written, nor what does not exist.
+            // Results, identity and registers that do not exist are read-only.
             LINE | RESULT..MODEL => {}
             ADDRESS => state.set(ADDRESS, &[byte & 0x7F]),
             _ if register < RESULT || PATCH.contains(&register) => state.set(register, &[byte]),
