@@ -223,6 +223,7 @@ impl<H: Hands> Ground<H> {
         let Some(spec) = self.about.ports.get(from.port) else { return };
         match (*spec, heard) {
             (PortSpec::PAGE, Heard::Bytes(text)) => {
+                // The server has already answered what it could not parse.
                 let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
                 let Some(asked) = asked else { return };
                 let deed = match &asked.ask {
@@ -334,6 +335,7 @@ impl<H: Hands> Ground<H> {
                 let armed = cockpit.view().state().armed;
                 let config = cockpit.parameters();
                 let info = parameters::find(config, name).ok().and_then(|index| config.describe(index));
+                // Some parameters may only change on the ground.
                 if armed && info.is_some_and(|info| !info.in_flight) {
                     return Err(Refusal::Armed.to_string());
                 }
@@ -410,6 +412,7 @@ fn refusal(guided: Guided, status: &FlightStatus) -> Option<String> {
 
 /// The seat of the page with this client's number.
 fn page(client: &Client) -> Seat {
+    // The server encodes the page's number in the address.
     let number = match client.address.ip() {
         IpAddr::V6(number) => number.to_bits() as u32,
         IpAddr::V4(number) => number.to_bits(),

@@ -23,6 +23,8 @@ pub(crate) struct Normals {
 impl From<Noise> for Normals {
     fn from(mut noise: Noise) -> Self {
         let (mut made, mut given) = ([0.0; LENGTH], LENGTH);
+        // The second variate of a pair already drawn from `noise` comes first, to keep its
+        // sequence.
         if let (Some(spare), Some(last)) = (noise.take_spare(), made.last_mut()) {
             *last = spare;
             given -= 1;
@@ -57,6 +59,7 @@ impl Normals {
         while found < PAIRS {
             let point = self.noise.point();
             (x[found], y[found], squares[found]) = (point.x, point.y, point.square);
+            // A rejected point is overwritten by the next one; no branch is needed.
             found += usize::from(point.is_inside());
         }
         // Same operations as in `Point::normals`.

@@ -247,6 +247,8 @@ impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
                     let _ = log.key_frame(clock, self.frame.get(..length).unwrap_or_default());
                     return;
                 }
+                // The size of the state is unknown in advance: the buffer grows until it fits and
+                // is reused afterwards.
                 Err(KeyFrameError::NoRoom) => self.frame.resize(2 * self.frame.len().max(4096), 0),
                 Err(_) => return,
             }

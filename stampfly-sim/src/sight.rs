@@ -81,6 +81,7 @@ impl Eye {
     pub fn look(&mut self, now: Instant) -> Seen {
         let truth = self.world.truth_at(now);
         let yaw = frame::yaw(&truth.attitude);
+        // The thrust axis in the horizontal frame of the heading: its horizontal part is the tilt.
         let up = frame::from_yaw(-yaw) * (truth.attitude * Vec3::new(0.0, 0.0, -1.0));
         let seen = Seen {
             position: truth.position - self.spot,
@@ -117,6 +118,7 @@ impl Hand {
     /// One control step toward `place`, or down to the ground there if `sinks`, facing north. Call
     /// it every [`LOOK`].
     pub fn steer(&mut self, seen: &Seen, place: Vec3, sinks: bool) -> Wish {
+        // Errors in the vehicle's heading frame, in which the sticks act.
         let ahead = frame::from_yaw(-seen.yaw);
         let (error, velocity) = (ahead * (place - seen.position), ahead * seen.velocity);
         let limit = |value: f32, most: f32| value.clamp(-most, most);
@@ -130,6 +132,8 @@ impl Hand {
         });
         let sink = if -seen.position.z < LOW { SETS_DOWN } else { SINK };
         let climb = if sinks { -sink } else { limit(-0.8 * error.z, CLIMB) };
+        // World z points down: `velocity.z` is the sink rate, so this is the error of the climb
+        // rate.
         let wrong = climb + velocity.z;
         self.throttle = limit(self.throttle + LEARNS_THROTTLE * wrong, 0.2);
         Wish { lean, throttle: self.throttle + 0.12 * wrong, turn: -seen.yaw }

@@ -139,6 +139,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
         for flight in flights {
             self.wait_until_ready().await;
             let Some(origin) = self.seat(|cockpit, _| cockpit.origin()) else { return };
+            // Positions are relative to the origin, which is known only when the vehicle is ready.
             let steps = Mission::steps(flight, &origin, height);
             let mut runner = Runner::new(height, reach);
             let armed = |cockpit: &mut dyn Cockpit| cockpit.view().state().armed;
@@ -172,6 +173,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
                 progress.legs.set(before + current.min(steps.len()));
                 self.turn().await;
             }
+            // The vehicle disarms during the last step, landing, before the runner has counted it.
             if runner.current() + 1 >= steps.len() {
                 progress.legs.set(before + steps.len());
             }
@@ -181,6 +183,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
 
     /// Waits until the vehicle has been ready to arm for [`SETTLES`].
     async fn wait_until_ready(&mut self) {
+        // Restarts whenever the vehicle becomes unready, so the time counts from the last change.
         let mut since = self.clock.now();
         loop {
             let is_ready = self.seat(|cockpit, _| {

@@ -66,6 +66,7 @@ impl Touchdowns {
         if truth.contact && self.flew {
             self.flew = false;
             let heading = frame::yaw(&truth.attitude);
+            // The strip can be used from both ends; distances count in the direction of landing.
             let towards = if math::cos(heading - self.strip) > 0.0 { 1.0 } else { -1.0 };
             let (sin, cos) = math::sin_cos(self.strip);
             let Vec3 { x, y, .. } = truth.position;
@@ -79,6 +80,7 @@ impl Touchdowns {
                 crab: math::wrap_angle(course - heading),
             });
         }
+        // Kept for the next call: at contact the ground has already reduced the sink rate.
         self.sink = truth.velocity.z;
     }
 

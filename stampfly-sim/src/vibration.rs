@@ -161,6 +161,7 @@ impl Vibration {
             let relative = rotor_speed[rotor] * self.per_hover;
             let share = relative * relative;
             power += share / ROTORS as f64;
+            // Double-angle formulas give the second harmonic without another rotation.
             let harmonics = [(cos, sin), (cos * cos - sin * sin, 2.0 * sin * cos)];
             for ((cos, sin), tone) in harmonics.into_iter().zip(tones) {
                 for ((sum, a), b) in total.iter_mut().zip(&tone.cos).zip(&tone.sin) {
@@ -168,6 +169,7 @@ impl Vibration {
                 }
             }
         }
+        // Standing rotors: no noise is drawn, so a vehicle at rest is cheap.
         if power < 1e-4 {
             return [0.0; AXES];
         }

@@ -232,13 +232,16 @@ impl<M: Measured> Watched<M> {
     /// Call it at every look.
     pub fn look(&mut self, now: Instant, shown: &Shown, truth: &Truth, injector: &Injector) {
         let Shown { ready, armed, height, stays, moves, lands, turns, scrapes, beside } = *shown;
+        // Compression and small hops on the feet stay below this height and do not count as flight.
         let is_clear = height > CLEAR;
         self.armed |= armed;
         self.is_armed = armed;
         if armed && is_clear {
             self.left.get_or_insert(now);
         }
+        // Disarmed before the first take-off is not a cut, even if a person lifts the vehicle.
         self.cut |= !armed && is_clear && self.has_flown();
+        // Only the first look of a contact counts, and none while a position is held on purpose.
         let touches = truth.contact && !self.touched && self.has_flown() && !is_clear && !stays;
         // Contact decelerates the vehicle within one look: the speed before it counts, too.
         let speed = self.speed.max(M::touch(truth));
@@ -271,9 +274,12 @@ impl<M: Measured> Watched<M> {
         let scraped = scrapes > self.scrapes && self.armed && (turns || truth.velocity.norm() > HARD);
         let hit = truth.contact && !self.touched && self.has_flown() && speed > HARD;
         self.scrapes = scrapes;
+        // A vehicle cut in the air falls; its impact is a consequence of the cut, not a crash of
+        // its own.
         if (scraped || hit) && !self.cut {
             self.crash.get_or_insert(Crash { at: now, speed, scraped, turned: Duration::ZERO });
         }
+        // Updated as long as the motors turn, so that it ends at the last look at which they did.
         if let Some(crash) = self.crash.as_mut().filter(|_| turns) {
             crash.turned = now.since(crash.at);
         }
@@ -286,8 +292,9 @@ impl<M: Measured> Watched<M> {
         self.cut || self.crash.is_some() && !self.is_armed
     }
 
-    /// Ends the flight with these faults. `injector` supplies how often each fault acted; `None`
-    /// where faults were injected interactively, which are not judged.
+    /// Ends the flight. `faults` are those given at its start; faults that a user injects during the
+    /// flight do not change the acceptable class. `injector` supplies how often each fault acted;
+    /// without it the counts are 0.
     pub fn end(&mut self, faults: &[Fault], injector: Option<&Injector>, last: Truth, armed: bool) {
         self.last = last;
         self.disarmed = self.armed && !armed;
@@ -311,6 +318,8 @@ impl<M: Measured> Watched<M> {
     /// The class of the outcome.
     #[must_use]
     pub fn class(&self) -> Class {
+        // The first condition that applies decides. A cut vehicle falls and may end on its back, so
+        // a cut is checked before the final attitude.
         if !self.armed {
             Class::Refused
         } else if self.farthest > M::AWAY {
@@ -375,6 +384,8 @@ impl<M: Measured> Verdict for Watched<M> {
         if self.live {
             return true;
         }
+        // With faults the class alone decides: a vehicle may rightly land before its mission is
+        // finished.
         let flown = self.facts().iter().all(|(_, holds)| *holds);
         let is_within =
             if self.by_sticks { self.class() <= self.worst() } else { self.class().is_within(self.worst()) };
@@ -398,6 +409,7 @@ impl<M: Measured> Verdict for Watched<M> {
         let landed = self.finished && self.stands() && self.touchdown <= HARD;
         let mut facts = vec![("landed", landed), ("disarmed", self.disarmed), ("finished", self.finished)];
         if self.by_sticks {
+            // Sticks may end in the air or on the ground upside down.
             facts.remove(0);
         }
         facts

@@ -71,6 +71,8 @@ impl State {
     fn advance_to(&mut self, instant: Instant) {
         let wanted = instant.since(self.start).as_micros() / STEP.as_micros();
         while self.steps < wanted {
+            // The motion is copied one step late: by now it has settled in memory, so the copy does
+            // not wait for the physics that computed it.
             self.history[self.steps as usize % HISTORY] = *self.body.motion();
             self.body.step();
             self.steps += 1;
@@ -85,7 +87,10 @@ impl State {
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
         let step = (since_start / STEP.as_micros()).max(oldest);
         let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
+        // The newest motion is not in the history yet.
         let motion = if step == self.steps { self.body.motion() } else { &self.history[step as usize % HISTORY] };
+        // `rest` exceeds a step only for an instant older than the history; the extrapolation is
+        // valid for one step.
         (motion, rest.min(DT))
     }
 
@@ -197,6 +202,7 @@ impl World {
     #[must_use]
     pub fn warmth_at(&self, instant: Instant) -> f64 {
         let (from, to, begun, length) = self.0.borrow().warmth;
+        // The lower bound avoids a division by zero for a step change.
         let share = instant.since(begun).seconds_f64() / length.seconds_f64().max(1e-6);
         from + (to - from) * share.clamp(0.0, 1.0)
     }
@@ -220,6 +226,7 @@ impl World {
     pub fn set_duty(&self, instant: Instant, duty: [f64; ROTORS]) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
+        // The steps before the command have been computed with the old duty by now.
         state.body.set_duty(duty);
     }
 

@@ -169,6 +169,7 @@ impl Asked {
     }
 
     fn from_object(mut object: Map<String, Value>) -> Result<Self, AskError> {
+        // These fields are removed from the object, since the request itself denies unknown fields.
         let mut number = |name, highest| {
             let number = object.remove(name).and_then(|value| value.as_u64()).filter(|number| *number <= highest);
             number.ok_or(AskError::Missing(name))

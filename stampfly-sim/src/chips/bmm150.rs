@@ -255,6 +255,7 @@ impl Bmm150 {
         for ((pair, word), _) in
             self.data.chunks_exact_mut(2).zip(words).zip(measured).filter(|(_, measured)| *measured)
         {
+            // Bit 0 holds the result of the last self-test and is kept.
             let passed = u16::from(pair[0] & 1);
             pair.copy_from_slice(&(word | passed).to_le_bytes());
         }

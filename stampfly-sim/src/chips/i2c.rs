@@ -163,6 +163,7 @@ impl I2cBus {
             latency = latency.drawn(self.0.noise.borrow_mut().unit());
         }
         let start = self.0.clock.now() + latency.setup;
+        // Each operation that is not polled ends with an interrupt and a wake of the task.
         let woken = operations.iter().fold(Duration::ZERO, |late, operation| {
             late + latency.of_bytes(match operation {
                 Operation::Read(bytes) => bytes.len(),
@@ -170,6 +171,7 @@ impl I2cBus {
             })
         });
         let (bits, stretch, outcome) = match self.stretch(address) {
+            // The controller fails at the start condition, after one bit.
             _ if !self.sda_is_high() => (1, Duration::ZERO, Err(BusError::ArbitrationLost)),
             None => (2 + BYTE, Duration::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
             Some(stretch) => (self.length(operations), stretch, Ok(())),

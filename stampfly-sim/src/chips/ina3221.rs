@@ -149,6 +149,7 @@ impl Ina3221 {
             Some(Flaw::Current(factor)) => [volts, amperes * factor],
             _ => [volts, amperes],
         };
+        // Both quantities are 13-bit signed numbers in bits 15 to 3.
         let word = |value: f64| ((value.round().clamp(-4_096.0, 4_095.0) as i16) << 3) as u16;
         let [shunt, bus] = self.measures();
         if shunt {

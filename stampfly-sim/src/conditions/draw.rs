@@ -85,6 +85,7 @@ impl Conditions {
             flow_largest_rate: 7.4,
             ..Self::GENTLE
         };
+        // The number of battery draws varies, so they come last and shift no other draw.
         let worn = conditions.clone();
         let mut batteries = (0..BATTERIES).map(|_| draw.battery(&worn));
         if let Some(battery) = batteries.find(bears) {

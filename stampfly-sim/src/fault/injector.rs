@@ -58,6 +58,7 @@ impl Injector {
     /// Reports that a moment has come. Only the first time counts.
     pub fn reached(&self, moment: Moment, now: Instant) {
         for entry in self.0.iter().filter(|entry| entry.fault.when == When::Moment(moment)) {
+            // Keeps the first instant.
             entry.begun.set(entry.begun.get().or(Some(now)));
         }
     }

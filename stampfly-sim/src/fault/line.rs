@@ -55,6 +55,7 @@ impl<M: Message> Line<M> {
             effect: distortion.effect,
             left: distortion.samples,
             words: words_of::<M>(distortion),
+            // A stream per fault and distortion: adding a fault changes no other fault's draws.
             noise: Noise::new(seed, STREAM + 100 * *place as u64 + number as u64),
         });
         Self { injector: injector.clone(), acting: acting.collect(), healthy: None, message: PhantomData }
@@ -78,6 +79,8 @@ impl<M: Message> Line<M> {
             if !self.injector.is_active(acting.place, at) || acting.left == Some(0) {
                 continue;
             }
+            // An active fault counts even if it has not changed this sample, so that `Stuck` keeps
+            // the value from before the fault.
             touched = true;
             acting.left = acting.left.map(|left| left - 1);
             let before = words;
@@ -90,6 +93,7 @@ impl<M: Message> Line<M> {
                 return None;
             }
         }
+        // A value that sticks from the first sample on sticks at that sample.
         if !touched || self.healthy.is_none() {
             self.healthy = Some(original);
         }

@@ -140,9 +140,9 @@ impl Battery {
     pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
         let source = self.open_circuit - self.polarisation - self.resistance * idle;
         let (mut voltage, mut drew) = (source, usize::MAX);
-        // The circuit is linear for the loads that conduct. Dropping loads that do not conduct lowers
-        // the voltage, so a dropped load never returns: the count stays the same after at most one
-        // pass per load, and the loop ends.
+        // The circuit is linear for the loads that conduct. Dropping loads that do not conduct
+        // lowers the voltage, so a dropped load never returns: the count stays the same after at
+        // most one pass per load, and the loop ends.
         loop {
             let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
             let (count, conductance, back) = drawing
@@ -160,6 +160,7 @@ impl Battery {
     pub fn step(&mut self, dt: f64, current: f64) {
         self.current = current;
         self.drawn += current * dt;
+        // Explicit Euler: a step is far shorter than the time constant.
         self.polarisation += (current * self.slow_resistance - self.polarisation) * (dt / self.time_constant);
         self.open_circuit = self.at_rest();
         self.voltage = (self.open_circuit - current * self.resistance - self.polarisation).max(0.0);
@@ -197,6 +198,7 @@ impl Battery {
 
     /// Open-circuit voltage from the discharge curve, linear between its points.
     fn at_rest(&self) -> f64 {
+        // Ten intervals of 10 % each; the index is limited for a full cell.
         let position = self.charge().min(1.0) * 10.0;
         let below = (position as usize).min(9);
         let (low, high) = (OPEN_CIRCUIT[below], OPEN_CIRCUIT[below + 1]);

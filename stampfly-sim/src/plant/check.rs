@@ -82,6 +82,8 @@ impl PlantParameters {
         let inertia = [self.inertia_x, self.inertia_y, self.inertia_z];
         let half = 0.5 * inertia.iter().sum::<f64>();
         for (axis, moment) in ["x", "y", "z"].into_iter().zip(inertia) {
+            // The triangle inequality of principal moments, with a tolerance for flat bodies, which
+            // reach equality.
             if moment > half * (1.0 + 1e-9) {
                 return refused(format!(
                     "inertia_{axis} {moment}: no rigid body has a moment of inertia above the sum of the other two"
@@ -122,6 +124,8 @@ impl PlantParameters {
         let full_speed = self.steady_speed(Battery::new(&self.battery(), 0.0).open_circuit());
         let per_volt = self.torque_coefficient / self.motor_voltage_a;
         let viscous = (self.motor_voltage_b - motor_constant) * per_volt;
+        // Damping of a rotor at full speed: electrical braking, the slope of the propeller's drag,
+        // and viscous friction.
         let braked = motor_constant * motor_constant / self.motor_resistance
             + 2.0 * self.torque_coefficient * full_speed
             + viscous;

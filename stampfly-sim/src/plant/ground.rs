@@ -98,6 +98,7 @@ impl Ground {
     ) -> [bool; ROTORS] {
         let corners = self.anchors.iter().skip(FEET).any(Option::is_some);
         let is_high = scene.slope == [0.0; 2] && -position.z - scene.highest() > self.span;
+        // Shortcut for the usual case in the air.
         let is_free = self.radius <= 0.0 || is_high;
         if is_free {
             self.scrapes += u64::from(corners);
@@ -158,12 +159,14 @@ impl Ground {
         for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
             let place = position + attitude * point;
             let depth = place.z - scene.floor(&place);
+            // Losing contact also forgets the anchor: the next contact sticks where it touches.
             if depth <= 0.0 {
                 *anchor = None;
                 continue;
             }
             let speed = velocity + attitude * rate.cross(point) - Vector3::new(floor_north, floor_east, 0.0);
             let normal = (self.stiffness * (depth * -out.z) - self.damping * speed.dot(&out)).max(0.0);
+            // On a moving floor the anchor moves along.
             let stuck = anchor.get_or_insert((place.x, place.y));
             *stuck = (stuck.0 + floor_north * DT, stuck.1 + floor_east * DT);
             let (mut x, mut y) = (

@@ -35,6 +35,7 @@ impl Lag {
         let before = self.mean.unwrap_or(now);
         let mean = before + (now - before) * self.share;
         self.mean = Some(mean);
+        // The same correction for all rotors leaves the torques unchanged.
         thrust.map(|thrust| (thrust + (mean - now)).max(0.0))
     }
 }

@@ -164,11 +164,14 @@ impl Plant {
         let p = &self.parameters;
         let m = &self.motion;
         self.wind.step();
+        // Ground effect by the height of the floor directly below, so an edge acts at once.
         let mut lift = self.ground.lift(self.scene.floor(&m.position) - m.position.z);
         if let Some(air) = &self.air {
             lift *= air.lift(m, &self.scene);
         }
         let held = self.ground.held(&m.position, &m.attitude, &self.scene);
+        // Before the rotor step, with the back-EMF of the present speeds: voltage and currents are
+        // consistent within the step.
         let voltage = self.battery.under(p.board_current, &self.rotors.loads());
         let loads = self.rotors.step(DT, voltage, lift, held);
         let current = loads.current + p.board_current;
@@ -213,6 +216,7 @@ impl Plant {
         };
         let angular_acceleration = acceleration(&(m.rate + acceleration(&m.rate) * (0.5 * DT)));
 
+        // Forces first, then integration: `advance` reads both accelerations from the motion.
         self.motion.specific_force = specific_force;
         self.motion.angular_acceleration = angular_acceleration;
         self.motion.advance(DT, p.gravity);

@@ -90,6 +90,7 @@ impl Rotors {
         let noise = &mut Noise::stream(seed, Stream::Airframe);
         let p = parameters;
         let spread = p.manufacturing_spread;
+        // Normal draws are truncated, so that no specimen is absurd.
         let limit = conditions.spread_limit;
         let per_volt = p.torque_coefficient / p.motor_voltage_a;
         let motor_constant = p.motor_constant();
@@ -98,6 +99,7 @@ impl Rotors {
         });
         let across = conditions.centre_spread * spread;
         let differs = within(limit * across, [across * noise.normal(), across * noise.normal()]);
+        // Design offset plus the specimen's.
         let centre = [p.centre_x + differs[0], p.centre_y + differs[1]];
         let motors = &mut Noise::stream(seed, Stream::RotorSpecimen);
         let mut differing = |mean: f64| {
@@ -183,16 +185,20 @@ impl Rotors {
             ((duty[i] * voltage - self.motor_constant[i] * speed[i]) / self.resistance[i]).max(0.0)
         });
         let drag = speed.map(|speed| self.torque_coefficient * speed * speed);
+        // Limited at zero: friction stops a rotor and does not turn it backwards.
         self.speed = core::array::from_fn(|i| {
             let net = self.motor_constant[i] * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
             (speed[i] + net / self.inertia * dt).max(0.0)
         });
+        // The airframe feels the opposite of what accelerates the rotor and of the propeller's
+        // drag.
         let mut reaction: [f64; ROTORS] = core::array::from_fn(|i| {
             let acceleration = (self.speed[i] - speed[i]) / dt;
             -SPINS[i] * (drag[i] + self.inertia * acceleration)
         });
         let mut thrust: [f64; ROTORS] =
             core::array::from_fn(|i| self.thrust_coefficient[i] * self.faults[i].thrust * speed[i] * speed[i] * lift);
+        // The lag acts on the thrust after faults, before contact removes single rotors.
         thrust = match &mut self.lag {
             Some(lag) => lag.pass(thrust),
             None => thrust,

@@ -64,6 +64,7 @@ impl Hand {
     #[must_use]
     pub fn toward(&self, there: &Self, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
+        // Smoothstep: zero velocity at both ends.
         let share = share * share * (3.0 - 2.0 * share);
         let turn = (self.attitude.inverse() * there.attitude).scaled_axis() * share;
         let angle = turn.norm();
@@ -151,12 +152,15 @@ impl Scene {
     /// Distance from a position to the floor along a unit vector that points down, m.
     #[must_use]
     pub fn distance(&self, place: &Vector3<f64>, beam: &Vector3<f64>) -> f64 {
+        // On a slope an edge counts only directly below the sensor; the beam meets the plane of
+        // that floor.
         if self.slope != [0.0; 2] {
             let steepness = beam.z + self.slope[0] * beam.x + self.slope[1] * beam.y;
             return (self.floor(place) - place.z) / steepness.max(1e-3);
         }
         let meets = |level: f64| (level - place.z) / beam.z;
         let Some((beyond, drop)) = &self.edge else { return meets(0.0) };
+        // z points down, so the upper floor has the smaller z.
         let (upper, lower) = (drop.min(0.0), drop.max(0.0));
         // A beam that passes over an edge meets the lower floor, and so does a beam that starts
         // below the upper floor.
@@ -180,6 +184,8 @@ impl Scene {
             // The face of the upper floor points towards the lower one.
             let (inside, out) = if drop > 0.0 { (-beyond.depth(place), 1.0) } else { (beyond.depth(place), -1.0) };
             let below = place.z - drop.min(0.0);
+            // A point nearer to the top than to the face is carried by the upper floor instead of
+            // being pushed by the face.
             let strikes = below > inside && self.floor(place) > drop.min(0.0);
             strikes.then_some((inside, Vector3::new(out * beyond.ahead[0], out * beyond.ahead[1], 0.0)))
         });

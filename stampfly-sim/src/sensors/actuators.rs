@@ -34,6 +34,7 @@ impl MotorOutputs for MotorModel {
         let mut duty = [0.0; ROTORS];
         for (duty, wanted) in duty.iter_mut().zip(output.duty) {
             if output.armed && wanted.is_finite() {
+                // Rounded to the resolution of the pulse-width modulation.
                 *duty = (f64::from(wanted.clamp(0.0, 1.0)) * PWM_STEPS).round() / PWM_STEPS;
             }
         }

@@ -85,6 +85,7 @@ impl AirspeedModel {
         let motion = self.world.motion_at(at);
         let (air, density) = self.world.inspect(|body| (body.air(-motion.position.z), body.air_density()));
         let ahead = motion.attitude.inverse_transform_vector(&(motion.velocity - air)).x;
+        // Signed: a tube reads suction when the air comes from behind.
         let dynamic = 0.5 * density * ahead * ahead.abs();
         let pressure = self.scale * dynamic + self.offset + DEVIATION * self.noise.normal();
         let temperature = TEMPERATURE + self.world.warmth_at(at) + 0.05 * self.noise.normal();

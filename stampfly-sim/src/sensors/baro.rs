@@ -71,6 +71,7 @@ impl BaroPhysics {
         let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
         let [strength, at_floor] = self.wash;
         let wash = wash * strength * thrust * (1.0 + at_floor * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        // Random walk, scaled by the time since the last conversion.
         self.drift += DRIFT * period.sqrt() * self.noise.normal();
         let (deviation, wander) = match &mut self.wander {
             Some(wander) => (Wander::white(deviation), wander.after(period)),

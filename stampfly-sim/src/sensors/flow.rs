@@ -63,6 +63,8 @@ impl FlowPhysics {
     pub(crate) fn new(world: &World, start: Instant, seed: u64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Flow);
         let conditions = world.conditions();
+        // Scale common to both axes, with a stream of its own so that the other draws are
+        // independent of it.
         let common = 1.0 + Noise::stream(seed, Stream::FlowSpecimen).within(conditions.flow_scale);
         let mut scale = || common * (1.0 + noise.within(conditions.flow_axis_scale));
         let (scale_x, scale_y) = (scale(), scale());
@@ -90,6 +92,7 @@ impl FlowPhysics {
             self.expose(self.frame);
             self.frame += 1;
         }
+        // The chip has 16-bit registers; the fraction stays for the next read.
         let whole = self.counts.map(|counts| counts.round().clamp(-32768.0, 32767.0));
         for (counts, whole) in self.counts.iter_mut().zip(whole) {
             *counts -= whole;
@@ -106,6 +109,7 @@ impl FlowPhysics {
         let motions = [begin, middle, end].map(|instant| over_floor(&self.world, instant));
         let rates = motions.map(|motion| angular_flow(&motion));
         let height = slant_height(&motions[1]);
+        // Linear loss of contrast below the focus distance.
         let sharp = ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
         let deviation = 0.25 + 0.15 * height.min(FAR);
         // Simpson's rule over the time between the pictures.

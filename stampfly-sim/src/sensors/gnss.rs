@@ -137,8 +137,10 @@ impl GnssModel {
     fn fix(&mut self, at: Instant) -> GnssData {
         let config = self.config;
         let motion = self.world.motion_at(at);
+        // Exact discretisation of the first-order process over one period.
         let keep = libm::exp(-1.0 / (config.rate * config.correlation.max(1e-3)));
         let drive = (1.0 - keep * keep).sqrt();
+        // All draws are made for every fix, so that the sequence is independent of the fix type.
         let [fresh, own, speed] = [(); 3].map(|()| self.noise.normal3());
         self.wander = self.wander * keep + deviations(config.wander).component_mul(&fresh) * drive;
 

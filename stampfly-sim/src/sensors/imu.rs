@@ -122,6 +122,7 @@ impl ImuPhysics {
             accel += of_accel * warmer;
             gyro += of_gyro * warmer;
         }
+        // White noise of density n, sampled at the rate r, has the standard deviation n·√(r/2).
         let per_sample = (RATE / 2.0).sqrt();
         let noise: [f64; 6] = self.noise.next();
         let sample = core::array::from_fn(|channel| {
@@ -133,6 +134,7 @@ impl ImuPhysics {
             value + shake[channel] + density * per_sample * noise[channel]
         });
         self.samples += 1;
+        // The slow random walk is advanced once per group.
         if self.samples.is_multiple_of(GROUP as u64) {
             let wander = (GROUP as f64 / RATE).sqrt();
             self.accel_bias += Vector3::from(self.noise.next()) * (ACCEL_WALK * wander);

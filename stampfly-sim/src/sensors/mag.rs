@@ -67,6 +67,7 @@ impl MagPhysics {
     /// One conversion at `at`, µT, body.
     pub(crate) fn field(&mut self, at: Instant) -> Vector3<f64> {
         let motion = self.world.motion_at(at);
+        // Commutation makes the field fluctuate in proportion to the current.
         let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
         let field = motion.attitude.inverse_transform_vector(&self.earth);
         self.soft_iron.map_or(field, |iron| iron * field)

@@ -41,6 +41,7 @@ impl PowerPhysics {
     pub(crate) fn measure(&mut self, now: Instant) -> [f64; 2] {
         self.world.advance_to(now);
         let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
+        // The mean over the interval comes from the charge, which includes every physics step.
         let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
         self.before = (drawn, now);
         let voltage = voltage + 0.003 * self.noise.normal();

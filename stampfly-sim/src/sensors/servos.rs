@@ -53,6 +53,7 @@ impl ServoOutputs for ServoModel {
         let mut shares = [0.0; SURFACES];
         let told = output.deflection.iter().take(usize::from(output.count));
         for (surface, wanted) in self.surfaces.iter().zip(told) {
+            // A value that is not finite centres the servo.
             let wanted = if wanted.is_finite() { f64::from(wanted.clamp(-1.0, 1.0)) } else { 0.0 };
             shares[*surface as usize] = (wanted * STEPS).round() / STEPS;
         }

@@ -104,6 +104,7 @@ impl StickFile {
                 let text = line.split(',').nth(place_of(&columns, 0)).unwrap_or_default();
                 return Err(StickErrorKind::GoesBack(clipped(text.trim())).at(number));
             }
+            // Held back: only the last repetition is kept, for the length of the file.
             if rows.last().is_some_and(|above| row.repeats(above)) {
                 held = Some(row);
             } else if rows.len() == MOST_ROWS {

@@ -50,6 +50,7 @@ impl<'f> Player<'f> {
         let mut frame = Frame { input: self.held.input, flip: false, land: false };
         let mut kill = false;
         while let Some(row) = self.rows.get(self.next).filter(|row| row.at <= time) {
+            // Rising edges between two frames are collected, so that a short pulse is not lost.
             frame.flip |= row.flip && !self.held.flip;
             frame.land |= row.land && !self.held.land;
             kill |= row.input.kill;

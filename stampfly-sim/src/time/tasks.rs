@@ -153,6 +153,7 @@ impl<'a> Tasks<'a> {
 
     fn poll(&mut self, index: usize) {
         let Some(task) = &mut self.tasks[index] else { return };
+        // Discards a deadline that a poll outside this executor has left.
         self.clock.take_wanted();
         match task.future.as_mut().poll(&mut Context::from_waker(&task.waker)) {
             Poll::Ready(()) => {

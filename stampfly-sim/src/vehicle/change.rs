@@ -51,6 +51,7 @@ pub fn carry_over<R: Schedule + Serialize + DeserializeOwned>(
     old: &R::Config,
     new: &R::Config,
 ) -> Result<R, ChangeError> {
+    // Comparing serialised trees needs no knowledge of the runnables' fields.
     let value = |runnables: &R| Value::serialized(runnables).map_err(|_| ChangeError::NotSerialisable);
     let (mut tree, old, new) = (value(flying)?, value(&R::new(old))?, value(&R::new(new))?);
     if patch(&mut tree, &old, &new)? == 0 && !same(&old, &new) {

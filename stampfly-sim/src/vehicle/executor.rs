@@ -85,6 +85,7 @@ pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
     witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Result<Ended<S::Outcome>, RemoteError> {
+    // The remote vehicle has an executor of its own.
     if options.jitter.is_some() {
         return Err(RemoteError::NotOffered("an executor that is late"));
     }
@@ -211,6 +212,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
             self.is_over = true;
             return Ok(false);
         };
+        // A deadline in the past belongs to a delayed executor: time does not go back.
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
         // Samples from outside reach the log before the activations that read them.
@@ -221,6 +223,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
         around.show(now);
         drain(taps, processor, around, witness);
         witness.lost(now, taps.lost());
+        // Changes from outside go in before the key frame, which then contains them.
         if let Some((flight_loop, mut record)) = processor.at_rest() {
             if around.tend(flight_loop, &mut record) {
                 witness.replaced(now);
@@ -233,6 +236,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
 
     fn end(self, witness: &mut dyn Witness<R>) -> Ended<S::Outcome> {
         let Self { mut processor, mut taps, tasks, mut around, clock, start, .. } = self;
+        // Drivers and pilots stop first, so that nothing is published after the last turn.
         drop(tasks);
         if processor.end(witness) {
             drain(&mut taps, &mut processor, &mut around, witness);

@@ -281,6 +281,7 @@ impl Live {
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
         let ports = &self.ports;
         let mut pace = self.speed.as_ref().map(|speed| Pace::new(speed, period));
+        // Ticks are multiples of the period since zero, whenever serving begins.
         let begun = clock.now().as_micros() / period.as_micros();
         for tick in 1_u32.. {
             let due = period.as_micros() * (begun + u64::from(tick));
@@ -294,6 +295,7 @@ impl Live {
                 Some(pace) => pace.wait(&mut |until| hear(Some(until)), &|| ports.are_closed()),
                 None => hear(None),
             }
+            // Other tasks and the executor run at the tick's instant before the answers are read.
             clock.sleep_until(clock.now() + AFTER_TICK).await;
             link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));
         }
@@ -335,9 +337,9 @@ impl<'s> Pace<'s> {
     }
 }
 
-/// Greatest delay that later ticks catch up. A busy machine delays a thread by tens of milliseconds,
-/// and stations extrapolate the vehicle's clock. No new sticks are received while catching up, so
-/// the limit is below the 500 ms after which vehicles declare a link lost.
+/// Greatest delay that later ticks catch up. A busy machine delays a thread by tens of
+/// milliseconds, and stations extrapolate the vehicle's clock. No new sticks are received while
+/// catching up, so the limit is below the 500 ms after which vehicles declare a link lost.
 const MADE_UP: std::time::Duration = std::time::Duration::from_millis(250);
 
 /// Instant of the next tick: one period after the last, or now if that is more than [`MADE_UP`]

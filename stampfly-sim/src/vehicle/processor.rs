@@ -74,10 +74,12 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
 
     fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>) -> Result<(), Infallible> {
         let Self { flight_loop, jitter, flight_at, interrupted, recording } = self;
+        // The compact record observes activations together with the witness.
         let outer = witness;
         let mut observers = (recording.as_ref().map(Recording::watching), &mut *outer);
         let witness = &mut observers;
         let held_up = around.is_held_up(Band::Flight, now);
+        // The delay is drawn once per due pass, not at every turn.
         if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
             *flight_at = Some(now + jitter.flight());
         }
@@ -93,6 +95,8 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
             None => {
                 while let Some(pending) = flight_loop.start_next(Band::Background, now, witness) {
                     let takes = jitter.background();
+                    // The activation has read its inputs; it publishes when the delay is over, with
+                    // newer samples on the bus by then.
                     if takes > Duration::ZERO {
                         *interrupted = Some((now + takes, pending));
                         break;

@@ -56,8 +56,10 @@ impl<'b, R: Schedule> Recording<'b, R> {
         R: Serialize,
     {
         let (writer, mut reader) = ring.split();
+        // Surroundings request the record when a client asks for it.
         reader.want(taker == Taker::Witness);
         let table = <R::Topics as TopicTable>::TOPICS.iter().enumerate();
+        // Periodic topics of runnables: samples from outside are recorded completely anyway.
         let fast = table.filter(|(_, info)| !info.is_outside && info.period.is_some());
         let mut topics: Vec<usize> = fast.map(|(place, _)| place).collect();
         topics.drain(..topics.len().saturating_sub(KEPT));

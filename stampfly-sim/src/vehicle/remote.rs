@@ -163,6 +163,7 @@ impl<'p> Remote<'p> {
                     let count = self.port.receive(&mut buffer, left)?;
                     self.received.extend_from_slice(&buffer[..count]);
                 }
+                // Bytes after the answer stay in the buffer: they may belong to the next one.
                 for (place, byte) in self.received.iter().enumerate() {
                     let Some(body) = self.decoder.feed(*byte) else { continue };
                     // A repeated request may be answered twice; the sequence number identifies the
@@ -178,6 +179,7 @@ impl<'p> Remote<'p> {
                 }
                 self.received.clear();
             }
+            // Back-off: a slow line would otherwise be loaded with repetitions.
             patience *= 2;
         }
         Err(RemoteError::NoAnswer)
@@ -251,6 +253,7 @@ impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
     /// True if the vehicle has something to do in these bands.
     fn is_needed(&self, now: Instant, bands: Bands) -> bool {
         let may_be = self.wakes || self.next_tick.is_some_and(|tick| tick <= now);
+        // A new sample or tick may concern either band.
         let may_run = bands.flight || bands.background;
         may_be && may_run || self.due.flight && bands.flight || self.due.background && bands.background
     }
@@ -278,9 +281,12 @@ impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
                     Entry::Activation(record) => {
                         let index = usize::from(record.index);
                         let activation = mirror.follow(record);
+                        // The tables were compared when greeting, so this is a corrupt answer.
                         if index >= R::ACTIVATIONS.len() || activation.is_missing_input() {
                             return Err(RemoteError::Nonsense);
                         }
+                        // The three events of an activation come together, because its run time
+                        // here is zero.
                         witness.starts(index);
                         witness.has_read(&activation);
                         witness.finished(&activation);

@@ -75,6 +75,7 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
                 ["end"] => (scenario.end, ended) = (time, true),
                 ["check", check @ ..] => scenario.checks.push(parse_check::<L>(time, check).map_err(at)?),
                 words => {
+                    // Fields that a line does not name keep their values.
                     let before = scenario.commands.last().map_or_else(C::default, |(_, command)| *command);
                     let command = changed(&before, words).filter(is_valid);
                     let command = command.ok_or_else(|| at(format!("'{}' is no command", words.join(" "))))?;
@@ -104,6 +105,7 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
         let mut lines = lines.peekable();
         let mut failures = Vec::new();
         for check in &self.checks {
+            // Both sequences ascend, so each line is skipped once.
             while lines.next_if(|(time, _)| *time < check.time).is_some() {}
             let value = lines.peek().and_then(|(_, line)| {
                 let words = line.to_words();

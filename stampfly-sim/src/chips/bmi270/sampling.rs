@@ -44,6 +44,7 @@ impl Bmi270 {
             let (sum, count) = &mut self.sums[sensor];
             sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
             *count += 1;
+            // Lower rates output the mean of the samples in between.
             if !self.tick.is_multiple_of(divider) {
                 continue;
             }

@@ -155,6 +155,7 @@ impl Mpu6000 {
         if tick.is_multiple_of(ACCEL_TICKS) {
             self.sampled[0] = self.convert(0, axes[0]);
         }
+        // With a filter the gyroscope has 1 kHz as well.
         if (fast || tick.is_multiple_of(ACCEL_TICKS)) && at.since(awake) >= GYRO_START {
             self.sampled[1] = self.convert(1, axes[1]);
         }

@@ -187,11 +187,13 @@ impl State {
                 }
             }
         }
+        // Ended transmissions are kept for a while, because a later one may have overlapped them.
         self.sent.retain(|sent| !sent.delivered || sent.until + LONGEST > now);
     }
 
     fn emit(&mut self, sender: Option<usize>, emission: Emission, from: Instant) -> Duration {
         let span = emission.rate.of(PREAMBLE + emission.bits.len() as u64);
+        // Both are drawn for every packet, so that the sequence does not depend on the loss rate.
         let (lost, place) = (self.noise.chance(self.loss), self.noise.unit());
         let wrong = lost.then_some((place * emission.bits.len() as f64) as usize);
         self.sent.push(Transmission { sender, emission, from, until: from + span, wrong, delivered: false });

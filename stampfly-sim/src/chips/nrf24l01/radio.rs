@@ -315,9 +315,11 @@ impl Radio {
             return;
         }
         let acknowledges = enhanced && self.registers.get(register::EN_AA) >> pipe & 1 != 0;
+        // A repetition has the same packet number and checksum.
         let seen = (control >> 1 & 3, sum);
         let again = acknowledges && self.heard[usize::from(pipe)] == Some(seen);
         if !again {
+            // No acknowledgement either: the sender repeats the packet.
             if self.received.len() == FIFO {
                 return;
             }

@@ -161,6 +161,7 @@ impl<C: SpiChip> SpiPort<C> {
             latency = latency.drawn(state.noise.borrow_mut().unit());
         }
         let mut levels = state.levels.get();
+        // Such a controller corrects the idle level before it selects the chip.
         if state.controller.get() == Controller::LevelFirst {
             levels.clock = wire::idles_high(self.mode);
         }
@@ -184,6 +185,7 @@ impl<C: SpiChip> SpiPort<C> {
                 }
             }
         }
+        // MOSI keeps the level of the last bit sent.
         state.levels.set(sent_last.map_or(levels, |last| Levels::after(self.mode, self.order, last)));
         let end = start + late + Duration::from_micros(nanoseconds.div_ceil(1_000));
         state.busy_until.set(end);

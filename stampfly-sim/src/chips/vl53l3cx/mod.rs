@@ -360,6 +360,8 @@ impl State {
         for (place, bin) in (BINS_FROM..).step_by(3).zip(if self.broken { [0; BINS] } else { bins }) {
             self.set(place, &bin.to_be_bytes()[1..]);
         }
+        // The last bin's low byte has its bits in two registers of their own; its usual place reads
+        // zero.
         let lowest = self.byte(REFERENCE - 1);
         self.set(REFERENCE - 1, &[0]);
         self.set(REFERENCE, &phase.to_be_bytes());

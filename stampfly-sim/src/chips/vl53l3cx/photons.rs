@@ -85,6 +85,7 @@ impl Photons {
     /// Counts of the bins, and number of detectors in use.
     pub(super) fn count(&mut self, shot: &Shot) -> ([u32; BINS], f64) {
         let strength: f64 = shot.echoes.iter().map(Echo::rate).sum();
+        // Automatic reduction of the number of detectors to the wanted rate.
         let share = (shot.wanted / (strength + shot.ambient)).min(1.0);
         let exposure = shot.macro_periods * COUNTED_PERIODS * shot.bin * share;
         let period = shot.period as f64;
@@ -104,6 +105,7 @@ impl Photons {
             } else {
                 let from = f64::from(group) * 4.0 + (place % 4) as f64;
                 arriving.iter().fold(ambient, |mean, (middle, rate)| {
+                    // Pulses emitted in earlier laser periods arrive in this one as well.
                     let rounds = (-1..=8).map(|round| from + f64::from(round) * period - middle);
                     let arrived: f64 =
                         rounds.map(|from| fraction(from + 1.0, shot.width) - fraction(from, shot.width)).sum();
@@ -116,6 +118,7 @@ impl Photons {
     }
 
     fn poisson(&mut self, mean: f64) -> u32 {
+        // Knuth's multiplication method below; its run time grows with the mean.
         if mean > MANY {
             return (mean + mean.sqrt() * self.noise.normal()).round().max(0.0) as u32;
         }

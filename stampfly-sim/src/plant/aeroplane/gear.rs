@@ -156,7 +156,9 @@ impl Gear {
             scrapes |= index >= SKIDS;
             let speed = velocity + attitude * rate.cross(&point.place);
             let normal = (point.stiffness * depth + point.damping * speed.z).max(0.0);
+            // Only the nose wheel is steered.
             let turned = if index == 0 { libm::sincos(steering) } else { (0.0, 1.0) };
+            // Skids have no rolling direction; the axes of the world serve for their friction.
             let ahead = if is_wheel { ahead(attitude, turned) } else { [1.0, 0.0] };
             let limits = match index {
                 0 => [self.rolling, self.side],
@@ -167,6 +169,8 @@ impl Gear {
             let across = speed.y * ahead[0] - speed.x * ahead[1];
             let bent = deflection.get_or_insert([0.0; 2]);
             if is_wheel {
+                // Relaxation of the tyre's lateral deflection over the distance rolled in this
+                // step.
                 bent[1] -= bent[1] * (along.abs() * DT / self.relaxation).min(1.0);
             }
             let mut held = [0.0; 2];

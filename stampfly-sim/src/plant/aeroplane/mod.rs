@@ -87,6 +87,7 @@ impl Aeroplane {
         };
         Self {
             inertia,
+            // A singular tensor, possible with a large product of inertia, disables rotation.
             inverse: inertia.try_inverse().unwrap_or_else(Matrix3::zeros),
             warp: Warp(WARP.map(|deviation| deviation * p.manufacturing_spread * noise.normal())),
             motion,
@@ -147,6 +148,7 @@ impl Aeroplane {
         let angles = core::array::from_fn(|i| shares[i] * reaches[i]);
         let air = self.through_air();
 
+        // Tested before the step, so that a propeller in contact gives no thrust in this step.
         let held = self.gear.holds_propeller(&m.position, &m.attitude);
         let voltage = self.battery.under(p.board_current, &[self.propeller.load()]);
         let thrust = self.propeller.step(DT, voltage, air.x, held);

@@ -95,6 +95,7 @@ impl Trim {
         let (_, angles, thrust) = balance(alpha);
 
         let propeller = Propeller::new(p, 0.0);
+        // The propeller sees the component along its axis.
         let air = airspeed * libm::cos(alpha);
         let (mut slow, mut fast) = (0.1, 4.0 * p.propeller_nominal_speed);
         // Thrust is not monotonic at low speed: a windmill brakes more the faster it turns. Its

@@ -89,6 +89,7 @@ impl Air {
             None => Push { force: Vector3::zeros(), torque: Vector3::zeros() },
         };
         if let Some(wall) = scene.wall.filter(|_| self.wall > 0.0) {
+            // Volume flow through all discs; the induced velocity is proportional to rotor speed.
             let flow = self.area * self.induced * share;
             let force = self.wall * near::beside_wall(-wall.depth(&motion.position), flow, self.radius);
             let toward = Vector3::new(wall.ahead[0], wall.ahead[1], 0.0) * force;

@@ -77,11 +77,13 @@ impl VortexRing {
         let still = Push { force: Vector3::zeros(), torque: Vector3::zeros() };
         let induced = self.induced * share;
         let climb = -air.z / induced;
+        // No random numbers are drawn outside the ring, which keeps ordinary flight cheap.
         if share < SLOWEST || climb > ONSET[0] {
             self.unsteady = [0.0; ROTORS];
             return still;
         }
         let sideways = (air.x * air.x + air.y * air.y).sqrt() / (SIDEWAYS * induced);
+        // Scales with the square of rotor speed, as thrust does.
         let strength = self.strength * (1.0 - sideways * sideways).max(0.0) * share * share;
         let loss = strength * self.per_inflow * excess(climb);
         let keep = libm::exp(-dt / LASTS);
