@@ -44,7 +44,7 @@
 //! #     fn send(&self, _: &Client, _: &[u8]) {}
 //! #     fn are_closed(&self) -> bool { true }
 //! # }
-//! /// A buoy with a lamp: it has parameters, and goes nowhere.
+//! /// A buoy with a lamp: it has parameters and accepts no commands.
 //! struct Buoy(Requested<Numbers, 8>);
 //!
 //! impl Hands for Buoy {

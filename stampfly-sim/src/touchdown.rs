@@ -62,6 +62,7 @@ impl Touchdowns {
     /// Checks for a touchdown. `height` is the height of the wheels, m. Call it at regular
     /// intervals.
     pub fn look(&mut self, height: f32, truth: &Truth) {
+        // Hysteresis: bounces below this height belong to the same landing.
         self.flew |= height > FLEW;
         if truth.contact && self.flew {
             self.flew = false;

@@ -197,10 +197,12 @@ impl Bmp280 {
         let deviation = DEVIATION * (7.0 * 4.0 / samples.max(1) as f64).sqrt();
         let (true_pressure, celsius) =
             (self.physics.pressure(at, period, deviation), f64::from(self.physics.temperature(at)));
+        // Temperature first: the pressure compensation needs the fine temperature.
         let temperature = invert(|adc| fine_temperature(adc) - 5_120.0 * celsius);
         let fine = fine_temperature(f64::from(temperature));
         let fresh = [invert(|adc| true_pressure - pressure(adc, fine)), temperature];
         let coefficient = f64::from(1u8 << (self.config >> 2 & 7).min(4));
+        // The first conversion initialises the filter.
         let before = self.filtered.unwrap_or(fresh.map(f64::from));
         let filtered: [f64; 2] =
             core::array::from_fn(|i| (before[i] * (coefficient - 1.0) + f64::from(fresh[i])) / coefficient);

@@ -204,6 +204,7 @@ impl Fault {
             (None, _) => kind.value.default(),
             (Some(_), None) => return Err(wrong(Problem::NoValue(kind.name))),
             (Some(value), Some([low, high])) => {
+                // NaN and values out of range are refused.
                 let number = number(value).filter(|value| (low..=high).contains(value));
                 Some(number.ok_or_else(|| wrong(Problem::Value(value.into(), kind)))?)
             }

@@ -59,6 +59,8 @@ impl Sizes {
     /// ```
     pub fn draw(&self, noise: &mut Noise) -> f64 {
         let [low, high] = self.range;
+        // Three digits survive being written and parsed, so a campaign's fault can be repeated from
+        // its text.
         let size = digits(low * libm::pow(high / low, noise.unit())).clamp(low, high);
         match self.measure {
             Measure::Number => size,

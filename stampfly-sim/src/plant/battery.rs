@@ -41,7 +41,7 @@ impl BatterySpec {
 /// ```
 /// use stampfly_sim::plant::{Battery, BatterySpec, Load};
 /// let battery = Battery::new(&BatterySpec { resistance: 0.5, ..BatterySpec::CELL }, 0.0);
-/// // A motor of 0.5 Ω whose own voltage is 2 V: what is above that is halved.
+/// // A motor of 0.5 Ω with a back-EMF of 2 V: battery and motor share the difference equally.
 /// let motor = Load { conductance: 2.0, back: 4.0 };
 /// let voltage = battery.under(0.0, &[motor]);
 /// assert!((voltage - 0.5 * (4.35 + 2.0)).abs() < 1e-9);

@@ -44,7 +44,7 @@ impl Disturbance {
 ///
 /// impl Body for Trolley {
 ///     fn step(&mut self) {
-///         // Somebody pushes: a metre a second more every second, forward.
+///         // A constant push forward of 1 m/s².
 ///         self.0.specific_force.x = 1.0;
 ///         self.0.advance(STEP.seconds_f64(), GRAVITY);
 ///     }

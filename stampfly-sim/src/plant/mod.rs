@@ -179,17 +179,22 @@ impl Plant {
 
         // Rotors have a drag linear in airspeed and rotor speed, the body a quadratic one.
         let speed = m.rotor_speed;
+        // Mean rotor speed relative to hover.
         let share = (speed[0] + speed[1] + speed[2] + speed[3]) / (ROTORS as f64 * self.rotors.hover_speed());
+        // Height above the level floor; steps are neglected.
         let mut wind = self.wind.velocity(-m.position.z);
         if let Some(air) = &mut self.air {
             wind += air.wind(share);
         }
+        // Velocity through the air in body axes, in which the drag coefficients are given.
         let air = m.attitude.inverse_transform_vector(&(m.velocity - wind));
         let linear = Vector3::new(p.drag_horizontal, p.drag_horizontal, p.drag_vertical) * share;
         let drag = -(air.component_mul(&linear) + air * (p.drag_quadratic * air.norm()));
 
         let (mut floor_force, mut floor_torque) =
             self.ground.push(&m.position, &m.velocity, &m.attitude, &m.rate, &self.scene);
+        // The hand acts like a contact force of the floor: force in world axes, torque in body
+        // axes.
         if self.scene.hand.is_some() {
             let (force, torque) = self.scene.hold(m);
             floor_force += force;

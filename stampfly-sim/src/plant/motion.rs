@@ -55,7 +55,7 @@ impl Motion {
     ///     motion.roll(core::f64::consts::PI * 1e-3, 2.0, 1.0);
     /// }
     /// assert!(motion.position.x.abs() < 0.01 && (motion.position.y - 4.0).abs() < 0.01);
-    /// // Like an accelerometer that is pushed to the inside.
+    /// // The centripetal acceleration, to the right.
     /// assert!((motion.specific_force.y - 2.0).abs() < 1e-3);
     /// ```
     pub fn roll(&mut self, dt: f64, speed: f64, turn: f64) {
@@ -83,8 +83,10 @@ impl Motion {
     #[inline(always)]
     pub fn advance(&mut self, dt: f64, gravity: f64) {
         let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
+        // Position first: it needs the velocity at the beginning of the step.
         self.position = self.position_after(dt, gravity);
         self.velocity += self.acceleration(gravity) * dt;
+        // The mean rate over the step makes the attitude second order.
         self.attitude = turn(&self.attitude, &(mean_rate * dt));
         self.rate = self.rate_after(dt);
     }

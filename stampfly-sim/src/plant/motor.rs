@@ -152,7 +152,7 @@ impl Rotors {
         self.duty
     }
 
-    /// Rotor speeds, rad/s, always positive.
+    /// Rotor speeds, rad/s, never negative.
     #[must_use]
     pub fn speed(&self) -> [f64; ROTORS] {
         self.speed

@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn the_face_of_an_edge_pushes_out_and_its_top_carries() {
         let ahead = Beyond { point: [0.0, 0.0], ahead: [1.0, 0.0] };
-        // The lower floor lies ahead, and behind.
+        // The lower floor is ahead, then behind.
         for (drop, upper, out) in [(0.7, 0.0, 1.0), (-0.7, -0.7, -1.0)] {
             let scene = Scene { edge: Some((ahead, drop)), ..Scene::default() };
             let struck = Vector3::new(-0.01 * out, 0.0, upper + 0.03);

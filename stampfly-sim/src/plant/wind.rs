@@ -95,7 +95,9 @@ impl Wind {
     /// Wind with this configuration; `dt` is the length of one physics step, s.
     pub(crate) fn new(config: &WindConfig, dt: f64, mut noise: Noise) -> Self {
         let deviation = f64::from(config.gust) * Vector3::new(1.0, 1.0, 0.5);
+        // Exact discretisation of the first-order process at the decimated rate.
         let keep = libm::exp(-dt * f64::from(DECIMATION) / f64::from(config.correlation).max(1e-3));
+        // Drawn from the stationary distribution, so that there is no transient at the start.
         let gust = deviation.component_mul(&noise.normal3());
         // This drive keeps the variance stationary.
         let drive = deviation * (1.0 - keep * keep).sqrt();
@@ -114,6 +116,7 @@ impl Wind {
         self.countdown -= 1;
         if self.countdown == 0 {
             self.countdown = DECIMATION;
+            // Calm air draws no random numbers.
             if self.drive.x > 0.0 {
                 self.gust = self.gust * self.keep + self.drive.component_mul(&Vector3::from(self.noise.next()));
             }

@@ -106,6 +106,7 @@ impl FlowPhysics {
         let period = self.frames.period();
         let begin = end - Duration::from_micros(period as u64);
         let middle = begin + end.since(begin) / 2;
+        // Begin, middle and end of the interval between the pictures.
         let motions = [begin, middle, end].map(|instant| over_floor(&self.world, instant));
         let rates = motions.map(|motion| angular_flow(&motion));
         let height = slant_height(&motions[1]);
@@ -116,6 +117,7 @@ impl FlowPhysics {
         let swept: [f64; 2] =
             core::array::from_fn(|axis| (rates[0][axis] + 4.0 * rates[1][axis] + rates[2][axis]) / 6.0 * period * 1e-6);
         let swept = self.motion.of(swept, period * 1e-6);
+        // Beyond the range there are no counts at all, not even noise.
         let seen = f64::from(u8::from(height < FAR));
         for (row, counts) in self.mounting.iter().zip(&mut self.counts) {
             let angle = row[0] * swept[0] + row[1] * swept[1];

@@ -114,6 +114,7 @@ impl ImuPhysics {
     pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
+        // Lever arm first, then misalignment and scale, offset, and temperature drift.
         let force = self.mounting.map_or(motion.specific_force, |mounting| mounting.felt(&motion));
         let mut accel = self.accel_matrix * force + self.accel_bias;
         let mut gyro = self.gyro_matrix * motion.rate + self.gyro_bias;

@@ -118,6 +118,7 @@ impl Light {
         let cover = Echo { distance: COVER, brightness: self.cover * NEAR.powi(2) };
         let each = self.floor / self.beams.len() as f64;
         let mut met: Vec<_> = self.beams.iter().filter_map(meets).map(|distance| distance / self.level).collect();
+        // Sorted by distance, the first gap longer than the pulse separates near and far targets.
         met.sort_by(f64::total_cmp);
         let is_apart = |pair: &[f64]| matches!(pair, [near, far] if far - near > PULSE);
         let split = met.windows(2).position(is_apart).map_or(met.len(), |place| place + 1);
@@ -133,6 +134,7 @@ impl Light {
         let [near, far, cover] = echoes;
         let floor = if far.rate() > near.rate() { far } else { near };
         let (of_floor, of_cover) = (floor.rate(), cover.rate());
+        // Signal of a floor at the maximum range.
         let least = self.floor / self.ceiling.powi(2);
         let is_out_of_reach = of_floor == 0.0 || floor.distance > self.ceiling;
         if is_out_of_reach && of_cover >= least {

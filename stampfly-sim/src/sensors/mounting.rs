@@ -30,6 +30,7 @@ impl Mounting {
         let mut noise = Noise::stream(seed, Stream::ImuMounting);
         let mut within = |bound: f64| Vector3::from_fn(|_, _| noise.within(bound));
         let turn = turned(&within(askew));
+        // Scale after rotation: each axis of the chip has its own.
         let mut scaled = || Matrix3::from_diagonal(&within(scale).map(|share| 1.0 + share)) * turn;
         Some(Self { accel: scaled(), gyro: scaled(), lever: within(lever) })
     }

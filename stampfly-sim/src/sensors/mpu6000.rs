@@ -50,6 +50,7 @@ impl Mpu6000Model {
 
     /// Accelerometer and gyro registers at this instant, in SI units.
     fn convert(&mut self, at: Instant) -> [Vec3; 2] {
+        // The chip runs at its own rate between polls.
         while self.schedule.instant(self.tick) <= at {
             self.physics.tick(self.tick, 0, self.schedule.instant(self.tick));
             if self.tick.is_multiple_of(ACCEL_TICKS) {

@@ -39,6 +39,7 @@ impl Schedule {
     /// overwritten it in the chip's registers by `now`. A conversion can be read `latency`
     /// microseconds after its instant.
     pub(crate) fn upcoming(&self, now: Instant, latency: f64) -> u64 {
+        // Number of the newest conversion that can be read now.
         let ready = (now.as_micros() as f64 - latency - self.first) / self.period;
         self.next.max(ready.max(0.0) as u64)
     }

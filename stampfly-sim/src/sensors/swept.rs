@@ -36,6 +36,7 @@ impl MotionError {
 
     /// Measured angles for these angles swept about each axis, rad, in a picture of this length, s.
     pub fn of(&mut self, swept: [f64; 2], picture: f64) -> [f64; 2] {
+        // The window is given as a rate; its size in angle depends on the picture's length.
         let window = self.largest_rate * picture;
         let followed = swept.map(|angle| followed(angle, window));
         if self.share == 0.0 {

@@ -108,6 +108,8 @@ impl RangePhysics {
         // of the flight.
         let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
         let invalid = |status| TofData { distance: 0.0, sigma: 0.0, status, valid: false };
+        // Between the maximum range and 1.2 times it the chip still gives a distance, marked as too
+        // weak.
         let Some(distance) = distance.filter(|d| *d <= ceiling * 1.2) else { return invalid(STATUS_SIGNAL) };
         // Distance with the same signal-to-noise ratio in a dark room over a bright floor.
         let dim = distance * (MAXIMUM / ceiling);
@@ -141,7 +143,7 @@ impl RangePhysics {
 /// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
 /// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
 ///
-/// // A second one, looking forward, for vehicles that have it.
+/// // A second, front range finder, for vehicles that have one.
 /// let mut front = RangeModel::new(&simulation.world, &simulation.clock, 1, Mount::Front);
 /// let Ok(sample) = block_on(&simulation.clock, front.next());
 /// assert!(!sample.data.valid, "no wall in sight");
@@ -179,6 +181,7 @@ impl RangeFinder for RangeModel {
         let begin = self.schedule.instant(number);
         self.clock.sleep_until(begin + Duration::from_micros(latency as u64)).await;
         self.schedule.reported(number);
+        // The chip integrates over the whole period, so the distance belongs to its middle.
         let at = begin + Duration::from_micros((0.5 * period) as u64);
         Ok(Sample { at, data: self.physics.measure(at) })
     }

@@ -122,6 +122,7 @@ impl Doors {
         let step = self.largest * between([SMALLEST, 1.0]);
         // Half of the steps are permanent, and half are negative.
         let (stays, falls) = (self.noise.chance(0.5), self.noise.chance(0.5));
+        // Exponentially distributed, so that doors are a Poisson process.
         let pause = -libm::log(1.0 - self.noise.unit()) / self.often;
         Swing {
             at: after + pause,
@@ -134,6 +135,7 @@ impl Doors {
     /// Pressure caused by doors, Pa. Call it with ascending instants.
     pub fn at(&mut self, instant: Instant) -> f64 {
         let time = instant.since(self.start).seconds_f64();
+        // A permanent step is added to the sum before the next door is drawn.
         while self.next.is_over(time) {
             self.stayed += self.next.step * self.next.share(time);
             let end = self.next.at + self.next.back.unwrap_or(0.0) + self.next.within;

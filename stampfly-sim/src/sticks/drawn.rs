@@ -45,6 +45,7 @@ pub(super) fn rows(seed: u64) -> Vec<Row> {
         if dice.0.chance(SWITCHES) {
             mode = dice.mode();
         }
+        // Uniform in the logarithm: short and long holds are equally likely.
         let mut holds = HOLDS[0] * (HOLDS[1] / HOLDS[0]).powf(dice.0.unit());
         let throttle = if !mode.is_manual() {
             dice.stick()

@@ -162,6 +162,8 @@ impl<'a> Tasks<'a> {
             }
             Poll::Pending => self.deadlines[index] = self.clock.take_wanted().unwrap_or(NEVER),
         }
+        // A linear search: there are few tasks, and the strict comparison keeps spawn order among
+        // equals.
         self.first = (NEVER, 0);
         for (index, deadline) in self.deadlines.iter().enumerate() {
             if *deadline < self.first.0 {

@@ -66,6 +66,7 @@ impl Fifo {
 
     /// The next byte. `time` is the time frame to send after the data, once per transfer.
     pub(super) fn pop(&mut self, time: Option<[u8; 3]>) -> u8 {
+        // A skip frame is inserted only between frames.
         if self.skipped > 0 && self.offset == 0 {
             self.frames.push_front(vec![SKIP, core::mem::take(&mut self.skipped)]);
         }

@@ -91,6 +91,7 @@ impl Physics {
                 continue;
             }
             let rate = RATE / ticks as f64;
+            // First-order low-pass with this corner frequency.
             let share = 1.0 - libm::exp(-core::f64::consts::TAU * bandwidth / rate);
             let noise = self.noise.normal3() * (density * libm::sqrt(rate / 2.0));
             for axis in 0..3 {

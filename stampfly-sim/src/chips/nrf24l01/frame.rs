@@ -75,6 +75,7 @@ pub(super) fn checksum(bits: &[bool], bytes: u8) -> u16 {
     };
     let mask = start;
     bits.iter().fold(start, |sum: u16, bit| {
+        // Bit by bit, because with a control field the data are not whole bytes.
         let out = (sum >> top & 1 == 1) ^ *bit;
         (sum << 1 ^ if out { polynomial } else { 0 }) & mask
     })

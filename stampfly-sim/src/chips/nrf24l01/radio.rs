@@ -329,6 +329,7 @@ impl Radio {
             self.heard[usize::from(pipe)] = Some(seen);
         }
         if acknowledges && control & NO_ACKNOWLEDGEMENT == 0 {
+            // The acknowledgement carries the number of the packet.
             self.packet = control >> 1 & 3;
             self.state = State::Settling(at + SETTLE, Some(pipe));
         }

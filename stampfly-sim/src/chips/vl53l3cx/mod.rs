@@ -474,6 +474,7 @@ impl OutputPin for ShutdownPin {
         let mut state = self.state.borrow_mut();
         let now = self.clock.now();
         if state.ready.is_none() {
+            // Traffic at this instant disturbs the boot of the chip.
             let in_traffic = state.busy_until.as_ref().is_some_and(|busy_until| busy_until.get() > now);
             state.ready = Some(if in_traffic { NEVER } else { now + BOOT });
         }

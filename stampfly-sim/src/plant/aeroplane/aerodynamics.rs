@@ -59,8 +59,11 @@ pub(super) fn lift_and_drag(p: &AeroplaneParameters, alpha: f64, pitching: f64, 
     let (sin, cos) = libm::sincos(alpha);
     let controls = p.lift_aileron * (right + left) + p.lift_flap * flaps + p.lift_elevator * elevator;
     let attached = p.lift_0 + p.lift_alpha * alpha;
+    // Lift of a flat plate, antisymmetric in the angle of attack.
     let plate = 2.0 * sin * sin.abs() * cos;
     let lift = (1.0 - separated) * attached + separated * plate + p.lift_q * pitching + controls;
+    // Induced drag is quadratic in the lift above that of least drag, and vanishes as the flow
+    // separates.
     let excess = (1.0 - separated) * (attached + controls - p.drag_lift_0);
     let induced = p.drag_induced * excess * excess * ground_effect(height, p.wing_span);
     let trimmed = p.drag_aileron * (right.abs() + left.abs())
@@ -101,9 +104,11 @@ pub(super) fn loads(
         return (Vector3::zeros(), Vector3::zeros());
     }
     let pressure = 0.5 * p.air_density * airspeed * airspeed * p.wing_area;
+    // Factors that make angular rates dimensionless.
     let (half_chord, half_span) = (0.5 * p.wing_chord / airspeed, 0.5 * p.wing_span / airspeed);
     let (roll, pitch, yaw) = (rate.x * half_span, rate.y * half_chord, rate.z * half_span);
     let rudder = d[Surface::Rudder as usize];
+    // Only the difference of the ailerons rolls; their sum acts as flaps.
     let aileron = d[Surface::RightAileron as usize] - d[Surface::LeftAileron as usize];
     // The sine of the sideslip, which is bounded when the air comes from the side or from behind.
     let slip = air.y / airspeed;
@@ -115,6 +120,8 @@ pub(super) fn loads(
     let [lift, drag] = lift_and_drag(p, alpha, pitch, d, height);
     let lift = lift * crossing;
     let side = p.side_beta * slip + p.side_p * roll + p.side_r * yaw + p.side_rudder * rudder;
+    // Drag is opposite to the motion through the air, lift perpendicular to it in the plane of
+    // symmetry.
     let force = air * (-drag / airspeed) + Vector3::new(lift * sin_a, side, -lift * cos_a);
 
     let moment = Vector3::new(
@@ -122,6 +129,7 @@ pub(super) fn loads(
         pitching(p, alpha, pitch, d) * crossing,
         p.yaw_beta * slip + p.yaw_p * roll + p.yaw_r * yaw + p.yaw_aileron * aileron + p.yaw_rudder * rudder,
     ) + Vector3::from(warp.0);
+    // Reference lengths of the moment coefficients.
     let lengths = Vector3::new(p.wing_span, p.wing_chord, p.wing_span);
     (force * pressure, moment.component_mul(&lengths) * pressure)
 }

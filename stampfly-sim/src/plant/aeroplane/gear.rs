@@ -154,6 +154,7 @@ impl Gear {
             let is_wheel = index < WHEELS;
             strikes |= !is_wheel;
             scrapes |= index >= SKIDS;
+            // Velocity of the contact point.
             let speed = velocity + attitude * rate.cross(&point.place);
             let normal = (point.stiffness * depth + point.damping * speed.z).max(0.0);
             // Only the nose wheel is steered.

@@ -96,6 +96,7 @@ impl Propeller {
     /// Thrust, N, and drag torque, N·m, at this speed, rad/s, and axial airspeed, m/s.
     pub(super) fn at(&self, speed: f64, air: f64) -> [f64; 2] {
         let turns = speed / TAU;
+        // Limited to the range of the polynomials: outside it they are meaningless.
         let advance = (air / (turns * self.diameter).max(1e-3)).clamp(0.0, self.advance_limit);
         let polynomial = |c: &[f64; 4]| c[0] + advance * (c[1] + advance * (c[2] + advance * c[3]));
         let square = turns * turns;
@@ -132,6 +133,7 @@ impl Propeller {
             return PropellerLoads { thrust: 0.0, torque, momentum, current: duty * current };
         }
         let [thrust, drag] = self.at(self.speed, air);
+        // The idle current stands for friction, independent of speed.
         let net = self.constant * (current - self.idle_current) - drag;
         self.speed = (before + net / self.inertia * dt).max(0.0);
         let reaction = drag + self.inertia * (self.speed - before) / dt;

@@ -88,6 +88,7 @@ impl Servos {
             (self.countdown, self.target) = (self.period, self.commanded);
         }
         for ((position, target), jammed) in self.position.iter_mut().zip(self.target).zip(self.jammed) {
+            // A jammed servo moves to its jam position with its own dynamics.
             let target = jammed.unwrap_or(target);
             *position += ((target - *position) * self.gain).clamp(-self.limit, self.limit);
         }

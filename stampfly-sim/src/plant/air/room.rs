@@ -37,6 +37,8 @@ impl Room {
     /// A room with this side, m, and a vehicle of this weight, N.
     pub fn new(side: f64, weight: f64, mut noise: Noise) -> Self {
         let deviation = (weight / DENSITY).sqrt() / side;
+        // The direction is drawn at once; its strength grows with `stirred`, so the air is still at
+        // first.
         let swirl = noise.normal3();
         let time = MEMORY * side / deviation.max(1e-3);
         Self { noise: noise.into(), deviation, time, swirl, stirred: 0.0, since: 0.0 }
@@ -50,6 +52,7 @@ impl Room {
             let keep = libm::exp(-self.since / self.time);
             let drive = (1.0 - keep * keep).sqrt();
             self.swirl = self.swirl * keep + Vector3::from(self.noise.next()) * drive;
+            // The returning flow follows the thrust with the correlation time.
             self.stirred += (share * share - self.stirred) * (1.0 - keep);
             self.since = 0.0;
         }

@@ -76,6 +76,7 @@ impl VortexRing {
     pub fn step(&mut self, dt: f64, air: &Vector3<f64>, share: f64) -> Push {
         let still = Push { force: Vector3::zeros(), torque: Vector3::zeros() };
         let induced = self.induced * share;
+        // Body z points down: a positive `air.z` is sinking.
         let climb = -air.z / induced;
         // No random numbers are drawn outside the ring, which keeps ordinary flight cheap.
         if share < SLOWEST || climb > ONSET[0] {
@@ -88,6 +89,7 @@ impl VortexRing {
         let loss = strength * self.per_inflow * excess(climb);
         let keep = libm::exp(-dt / LASTS);
         let deviation = UNSTEADY * self.each * unsteadiness(climb);
+        // Independent per rotor, hence the torque.
         let noise: [f64; ROTORS] = self.noise.next();
         let mut push = Push { force: Vector3::new(0.0, 0.0, loss), ..still };
         for ((unsteady, noise), (x, y)) in self.unsteady.iter_mut().zip(noise).zip(PLACES) {
