@@ -1,7 +1,8 @@
-//! How much faster than real time the simulator runs: `cargo run --release -p stampfly-sim --example speed`.
+//! Measures how much faster than real time the simulator runs: `cargo run --release -p stampfly-sim
+//! --example speed`.
 //!
-//! Flies one vehicle with every sensor read by a task of its own and a small controller on the truth, for a minute of
-//! simulated time, and prints the machine time one 2.5 ms control period costs.
+//! Flies one vehicle with a task per sensor and a small controller on the true state for one minute
+//! of simulated time, and prints the wall-clock time per control period of 2.5 ms.
 
 #[path = "../tests/sim/pilot.rs"]
 mod pilot;

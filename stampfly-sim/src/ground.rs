@@ -1,11 +1,12 @@
-//! What every vehicle that is served has at its ports: MAVLink, MSP, and the page of the ground station.
+//! Services at the ports of a simulated vehicle: MAVLink, MSP and the ground station's page
+//! (feature `ground`).
 //!
-//! A vehicle writes its [`Hands`], says in an [`About`] what it is, and lists in its [`PORTS`](crate::vehicle::Vehicle::PORTS) which of
-//! [`PortSpec::PAGE`], [`PortSpec::MAVLINK_UDP`], [`PortSpec::MAVLINK_TCP`], [`PortSpec::MSP`] and [`PortSpec::MSP_SERIAL`] it opens; the constant is what
-//! tells which language a port speaks. [`Served`] is all it hands to [`Live::serve`]. A vehicle that speaks more than these holds a [`Ground`] in a [`Link`]
-//! of its own. Not for vehicles with a protocol of their own and nothing else: they need neither.
-//!
-//! With feature `ground`.
+//! A vehicle implements [`Hands`], describes itself in an [`About`], and lists in its
+//! [`PORTS`](crate::vehicle::Vehicle::PORTS) which of [`PortSpec::PAGE`],
+//! [`PortSpec::MAVLINK_UDP`], [`PortSpec::MAVLINK_TCP`], [`PortSpec::MSP`] and
+//! [`PortSpec::MSP_SERIAL`] it opens; the port's constant determines its protocol. It then passes a
+//! [`Served`] to [`Live::serve`]. A vehicle with further protocols holds a [`Ground`] in a [`Link`]
+//! of its own. A vehicle with only its own protocol needs neither.
 //!
 //! ```
 //! use core::cell::RefCell;
@@ -43,7 +44,7 @@
 //! #     fn send(&self, _: &Client, _: &[u8]) {}
 //! #     fn are_closed(&self) -> bool { true }
 //! # }
-//! /// A buoy with a lamp: it has parameters, and goes nowhere.
+//! /// A buoy with a lamp: it has parameters and accepts no commands.
 //! struct Buoy(Requested<Numbers, 8>);
 //!
 //! impl Hands for Buoy {
@@ -100,39 +101,40 @@ use stampfly_types::messages::{FlightStatus, GuidedCommand};
 use stampfly_types::{Duration, Instant};
 use std::sync::Arc;
 
-/// Between two looks at the ports: what is heard waits for so long at most.
+/// Period of [`Live::serve`]: the longest delay of received data.
 pub const PERIOD: Duration = Duration::from_millis(5);
-/// Ticks between two turns of the services that send by themselves: 20 ms.
+/// Ticks between two runs of the services that send periodically: 20 ms.
 pub const TURN: u32 = 4;
 
-/// Clients of MAVLink at once: more than a TCP port takes, so that those that only listen there keep no datagrams out.
+/// MAVLink clients at once: more than a TCP port accepts, so that listening TCP clients do not
+/// exclude datagrams.
 const CLIENTS: usize = 48;
-/// Asks of pages that wait to be seen done. More are refused, but for those that end a flight: they
-/// take the place of the oldest.
+/// Page requests waiting for confirmation. Further requests are refused, except those that end a
+/// flight, which replace the oldest.
 const WAITS: usize = 64;
 
-/// What a vehicle is for programs at its ports.
+/// Description of a vehicle for the programs at its ports.
 #[derive(Clone, Copy, Debug)]
 pub struct About {
-    /// Its kind in MAVLink.
+    /// Vehicle type in MAVLink.
     pub kind: MavType,
-    /// Its version: major, minor, patch.
+    /// Version: major, minor, patch.
     pub version: [u8; 3],
-    /// Height that a take-off without one climbs to, m.
+    /// Default take-off height, m.
     pub take_off_height: f32,
-    /// A place of a mission is reached within this distance, m, unless its item says another.
+    /// Default acceptance radius of a mission's waypoints, m.
     pub reach: f32,
-    /// What a configurator is told. A vehicle without one has no port for configurators, or one that is silent.
+    /// Answers to configurators. Without it MSP ports stay silent.
     pub card: Option<&'static Card>,
-    /// Its ports, in the order of [`Vehicle::PORTS`](crate::vehicle::Vehicle::PORTS).
+    /// Ports in the order of [`Vehicle::PORTS`](crate::vehicle::Vehicle::PORTS).
     pub ports: &'static [PortSpec],
-    /// The faults that a page may name.
+    /// Faults that a page may inject.
     pub faults: &'static [FaultKind],
-    /// Its topics.
+    /// Topics of the vehicle.
     pub topics: &'static [TopicInfo],
 }
 
-/// The services that are the same for every vehicle, and the vehicle's hands.
+/// The services common to all vehicles, with the vehicle's hands.
 pub struct Ground<H> {
     about: About,
     identity: Identity,
@@ -140,25 +142,25 @@ pub struct Ground<H> {
     msp: Vec<(Client, Msp)>,
     helm: Helm,
     places: Places,
-    /// Tells which ports are this machine's alone.
+    /// Open ports; tells which of them are local.
     ports: Arc<dyn Ports>,
     speed: Option<Speed>,
     faults: Injector,
-    /// What was asked of the vehicle, and told to pages.
+    /// Number of the last event reported to pages.
     told: u32,
-    /// Who commands, as pages were told last.
+    /// The commander last reported to pages.
     commander: Option<Option<Seat>>,
-    /// What pages have asked, and is not seen yet.
+    /// Page requests not yet confirmed.
     waits: Vec<(Client, Asked, Waited)>,
-    /// What the vehicle does for them.
+    /// Actions of the vehicle for the services.
     pub hands: H,
 }
 
-/// What the console says to a line that the page has sent.
+/// Handler of console lines from the page.
 pub type Console<'c, H> = &'c mut dyn FnMut(&mut H, &str) -> Result<Reply, String>;
 
 impl<H: Hands> Ground<H> {
-    /// Those of a vehicle with these hands, which can be broken by these faults.
+    /// Services of a vehicle with these hands. `faults` are those that a page can inject.
     #[must_use]
     pub fn new(about: &About, live: &Live, faults: &Injector, hands: H) -> Self {
         let identity = Identity {
@@ -190,24 +192,25 @@ impl<H: Hands> Ground<H> {
         }
     }
 
-    /// What it is in MAVLink.
+    /// Identity of the vehicle in MAVLink.
     #[must_use]
     pub const fn identity(&self) -> Identity {
         self.identity
     }
 
-    /// The vehicle, for one call of a service.
+    /// Cockpit of the vehicle for one call of a service.
     pub fn seated<'s>(&'s mut self, samples: &'s dyn Samples) -> Seated<'s> {
         let Self { helm, places, hands, .. } = self;
         Seated { helm, hands, view: View::new(samples, places) }
     }
 
-    /// Who commands, and the vehicle's hands: for what comes to the vehicle by its own radio, and asks the helm itself.
+    /// Command authority and hands: for a radio of the vehicle's own, which checks authority
+    /// itself.
     pub const fn helm(&mut self) -> (&mut Helm, &mut H) {
         (&mut self.helm, &mut self.hands)
     }
 
-    /// Something was heard at one of the ports that are the same for every vehicle. Nothing happens at another.
+    /// Handles an event at one of the common ports; events at other ports are ignored.
     pub fn hear(
         &mut self,
         now: Instant,
@@ -220,6 +223,7 @@ impl<H: Hands> Ground<H> {
         let Some(spec) = self.about.ports.get(from.port) else { return };
         match (*spec, heard) {
             (PortSpec::PAGE, Heard::Bytes(text)) => {
+                // The server has already answered what it could not parse.
                 let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
                 let Some(asked) = asked else { return };
                 let deed = match &asked.ask {
@@ -230,11 +234,11 @@ impl<H: Hands> Ground<H> {
                 if is_full && deed.is_some_and(|deed| !deed.ends_a_flight()) {
                     return put(&from, asked.answered(Err(TOO_MANY.into())).as_bytes());
                 }
-                // Before the vehicle is asked: its refusals are counted.
+                // Before the request is passed on, because the vehicle's refusals count from here.
                 let waited = deed.map(|deed| Waited::new(now, deed, &self.seated(samples)));
                 let answer = self.page(now, page(&from), &asked.ask, samples, console);
                 match waited {
-                    // Answered when it is seen to have happened.
+                    // Answered when the vehicle has visibly carried it out.
                     Some(waited) if answer.is_ok() => {
                         if is_full {
                             let (client, asked, _) = self.waits.remove(0);
@@ -242,7 +246,7 @@ impl<H: Hands> Ground<H> {
                         }
                         self.waits.push((from, asked, waited));
                     }
-                    // What is said again and again needs no answer.
+                    // Repeated requests are not answered.
                     _ if asked.ask.is_repeated() => {}
                     _ => put(&from, asked.answered(answer).as_bytes()),
                 }
@@ -296,7 +300,7 @@ impl<H: Hands> Ground<H> {
         }
     }
 
-    /// Does what a page asks for. A line for the console is `console`'s.
+    /// Carries out a request of a page. Console lines go to `console`.
     fn page(
         &mut self,
         now: Instant,
@@ -313,7 +317,8 @@ impl<H: Hands> Ground<H> {
         };
         match ask {
             Ask::Guided(guided) if let Some(why) = refusal(*guided, &cockpit.view().state()) => Err(why),
-            // A click on the map replaces the way-points that wait: it is flown at once.
+            // A click on the map replaces the waiting waypoints, so that it takes effect
+            // immediately.
             Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, seat, (*go_to).into())),
             Ask::Guided(guided) => said(cockpit.guide(now, seat, (*guided).into())),
             Ask::Sticks(sticks) => said(cockpit.steer(now, seat, &(*sticks).into())),
@@ -330,6 +335,7 @@ impl<H: Hands> Ground<H> {
                 let armed = cockpit.view().state().armed;
                 let config = cockpit.parameters();
                 let info = parameters::find(config, name).ok().and_then(|index| config.describe(index));
+                // Some parameters may only change on the ground.
                 if armed && info.is_some_and(|info| !info.in_flight) {
                     return Err(Refusal::Armed.to_string());
                 }
@@ -359,20 +365,20 @@ impl<H: Hands> Ground<H> {
         let same = |other: &Fault| other.kind == fault.kind && other.value == fault.value;
         let place = self.faults.faults().position(same).ok_or("in flight, only with its usual value")?;
         match fault.when {
-            // A moment of the flight may have passed, a time that has is now.
+            // A moment of the flight may be over, so only immediate faults are accepted.
             When::Moment(_) => return Err("in flight, only now: @0".into()),
             When::After(_) => self.faults.begin(place, now, fault.lasts),
         }
         Ok(Reply::text(text))
     }
 
-    /// What is to be done at every tick, whoever is connected. Before [`answer`](Self::answer).
+    /// Call it at every tick, before [`answer`](Self::answer): updates the command authority.
     pub fn poll(&mut self, now: Instant, samples: &dyn Samples) {
         let armed = View::new(samples, &self.places).state().armed;
         self.helm.poll(now, armed, &mut self.hands);
     }
 
-    /// Sends what is due. Call it at every turn.
+    /// Sends due data. Call it every [`TURN`] ticks.
     pub fn answer(&mut self, now: Instant, samples: &dyn Samples, put: Put<'_>) {
         let holder = self.helm.holder(now);
         if self.commander.replace(holder) != Some(holder) {
@@ -397,15 +403,16 @@ impl<H: Hands> Ground<H> {
     }
 }
 
-/// Why a vehicle in this state does not do it, as far as that is known before it is asked.
+/// Why a vehicle in this state would refuse the command, as far as known beforehand.
 fn refusal(guided: Guided, status: &FlightStatus) -> Option<String> {
     let mut words = String::new();
     let deed = Deed::of(GuidedCommand::from(guided).kind)?;
     deed.refuse(status, &mut words).then_some(words)
 }
 
-/// The page of this number.
+/// The seat of the page with this client's number.
 fn page(client: &Client) -> Seat {
+    // The server encodes the page's number in the address.
     let number = match client.address.ip() {
         IpAddr::V6(number) => number.to_bits() as u32,
         IpAddr::V4(number) => number.to_bits(),
@@ -413,14 +420,15 @@ fn page(client: &Client) -> Seat {
     Seat::Page(number)
 }
 
-/// All that a vehicle has at its ports, when it has nothing else there: hand it to [`Live::serve`] with [`PERIOD`].
+/// The [`Link`] of a vehicle that has only the common services: pass it to [`Live::serve`] with
+/// [`PERIOD`].
 pub struct Served<'n, H, S> {
     ground: Ground<H>,
     newest: &'n RefCell<S>,
 }
 
 impl<'n, H: Hands, S: Samples> Served<'n, H, S> {
-    /// As [`Ground::new`], of a vehicle whose newest samples are noted there.
+    /// As [`Ground::new`]; the vehicle's newest samples are read from `newest`.
     #[must_use]
     pub fn new(about: &About, live: &Live, faults: &Injector, hands: H, newest: &'n RefCell<S>) -> Self {
         Self { ground: Ground::new(about, live, faults, hands), newest }

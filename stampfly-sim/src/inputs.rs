@@ -1,27 +1,28 @@
-//! What a vehicle is given during a flight, in order: the part of a recording that a golden flight is made of.
+//! Collects the inputs of a flight in order: the content of a golden flight's record.
 //!
-//! Only what comes from outside is collected; everything else follows from it.
+//! Only samples published outside the runnables and the executor's turns are collected; all other
+//! data follow from them.
 
 use stampfly_bus::{Schedule, TopicTable};
 use stampfly_types::Instant;
 
-/// What a vehicle was given.
+/// One input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Somebody outside published.
+    /// A sample published outside the runnables.
     Sample {
-        /// The topic.
+        /// Index of the topic.
         topic: usize,
         /// The sample's instant.
         at: Instant,
         /// The message.
         words: Vec<u32>,
     },
-    /// The executor ran what was due.
+    /// The executor ran due activations at this instant.
     Turn(Instant),
 }
 
-/// Collects what a vehicle is given, in order.
+/// Collects the inputs of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     collected: Vec<Event>,
@@ -29,12 +30,12 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// The executor is about to look what is due.
+    /// The executor is about to check which activations are due.
     pub(crate) fn turn(&mut self, clock: Instant) {
         self.turn = Some(clock);
     }
 
-    /// Something was due.
+    /// An activation was due in this turn; turns without one are not collected.
     pub(crate) fn activation(&mut self) {
         self.collected.extend(self.turn.take().map(Event::Turn));
     }
@@ -45,7 +46,7 @@ impl Inputs {
         }
     }
 
-    /// What was collected.
+    /// The collected inputs.
     #[must_use]
     pub fn into_collected(self) -> Vec<Event> {
         self.collected

@@ -1,32 +1,37 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The parts
-//! A simulated vehicle behind the same traits as a real one.
+//! # Modules
 //!
-//! * [`time`]: virtual time and a deterministic executor;
-//! * [`Conditions`]: how worn, how far from the next specimen, over what floor and in what light;
-//! * [`plant`]: the vehicle as a body with motors, a battery, the ground and the air: a quadrotor, an aeroplane, or one of your own;
-//! * [`sensors`]: the chips, with their rates, noise, delays and quirks;
-//! * [`chips`]: the same chips at register level behind simulated buses, with faults, for testing drivers;
-//! * [`fault`]: what goes wrong in a flight, when, and for how long;
-//! * [`sight`]: a person who flies by sight, for vehicles that are flown by sticks alone;
-//! * [`sticks`]: files of what a person's thumbs did, or are to do;
-//! * [`watched`]: how a flight looks from beside the field, and which end it was;
-//! * [`ask`]: what a ground station asks of a vehicle that flies in real time;
-//! * [`ground`]: the services that every vehicle has at its ports, and [`station`], who flies missions from there (feature `ground`);
-//! * [`touchdown`]: where and how an aeroplane has touched down on a strip;
-//! * [`vehicle`]: a whole vehicle with its flight stack, on virtual time;
-//! * [`recorder`], [`inputs`]: the log of a simulated flight, and what a vehicle was given in it;
-//! * [`Simulation`]: all of it from one [`SimulationConfig`].
+//! | module | contents |
+//! |---|---|
+//! | [`Simulation`], [`World`] | a vehicle, its surroundings and its sensors from one [`SimulationConfig`] |
+//! | [`Conditions`] | battery wear, spread between specimens, floor, light and air of a flight |
+//! | [`time`] | virtual clock and a deterministic single-threaded executor |
+//! | [`plant`] | dynamics: quadrotor, aeroplane, or your own [`Body`](plant::Body) |
+//! | [`sensors`] | sensor models: rate, noise, delay, resolution, range |
+//! | [`chips`] | the same sensors as register-level emulators on simulated buses, for testing drivers |
+//! | [`fault`] | faults of a flight: what fails, when, and for how long |
+//! | [`sticks`] | stick files: recorded or scripted stick input |
+//! | [`sight`] | a model pilot who flies by sight, for vehicles that take stick input only |
+//! | [`vehicle`] | a vehicle with its flight stack on virtual time |
+//! | [`watched`], [`touchdown`] | assessment of a flight from the true motion |
+//! | [`recorder`], [`inputs`] | log, hash and collected inputs of a flight |
+//! | [`ask`] | requests of a ground station to a simulated vehicle |
+//! | [`ground`], [`station`] | MAVLink, MSP and web services; a ground station that flies missions (feature `ground`) |
 //!
-//! Everything is a value: no global, no thread, and no wall clock but in [`vehicle::Live`]. A process can hold as many vehicles as memory allows,
-//! and the same seed gives the same bits, in debug and release builds and on every machine.
+//! # Determinism
+//! Everything is a value: there is no global state and no thread, and only [`vehicle::Live`],
+//! hardware in the loop and the timing of [`recorder`] read the wall clock. One process can hold as
+//! many vehicles as memory allows. The same seed gives the same bits in debug and release builds
+//! and on every machine.
 //!
-//! The vehicle is a value that its own crate gives: [`PlantParameters`](plant::PlantParameters) of a quadrotor in X of up to a few
-//! hundred grams whose motors do not brake, [`AeroplaneParameters`](plant::AeroplaneParameters) of a conventional aeroplane with one
-//! electric propeller. A vehicle of another kind implements [`Body`](plant::Body) and [`Airframe`](plant::Airframe). Not for every
-//! purpose: no vehicle bends, no aeroplane spins; the vibration that chips feel is the StampFly's, more or less of it.
-
+//! # Limits
+//! [`PlantParameters`](plant::PlantParameters) describes a quadrotor in X of up to a few hundred
+//! grams whose motors do not brake; [`AeroplaneParameters`](plant::AeroplaneParameters) a
+//! conventional aeroplane with one electric propeller. For another kind of vehicle implement
+//! [`Body`](plant::Body) and [`Airframe`](plant::Airframe). Airframes are rigid, aeroplanes do not
+//! spin, and the vibration that the inertial sensor measures has the spectrum of the StampFly,
+//! scaled.
 pub mod ask;
 pub mod chips;
 mod conditions;
@@ -53,8 +58,8 @@ mod vibration;
 pub mod watched;
 mod world;
 
-/// The vectors and rotations of a [`plant`].
 pub use conditions::Conditions;
+/// Linear algebra: the types in which the motion of a [`plant`] is written.
 pub use nalgebra;
 pub use noise::Noise;
 pub use rms::Rms;
@@ -62,6 +67,6 @@ pub use simulation::{Simulation, SimulationConfig};
 pub use specimen::Specimen;
 /// The traits that simulated sensors and motors implement.
 pub use stampfly_drivers as drivers;
-/// Messages, time, vectors: the words that signatures here are written in.
+/// Messages, instants, durations and vectors used in the signatures of this crate.
 pub use stampfly_types as types;
 pub use world::{Truth, World};

@@ -1,15 +1,15 @@
-//! Randomness: the only place in the whole stack that has any.
+//! Random numbers: the only source of randomness in the whole stack.
 //!
-//! Every model that needs chance owns a [`Noise`], made from the simulation's seed and the model's own stream
-//! number. Streams of one seed are independent, so adding a sensor or reading one more often changes no number
-//! that another sees. The generator is ChaCha with 8 rounds; normal variates come from Marsaglia's polar method
-//! (Marsaglia and Bray 1964) over the `libm` crate, so they have the same bits on every machine, which the
-//! platform's logarithm would not give.
+//! Each random model owns a [`Noise`] made from the simulation's seed and the model's own stream
+//! number. Streams of one seed are independent: adding a sensor, or reading one more often, changes
+//! no other sensor's values. The generator is ChaCha with 8 rounds. Normal variates use Marsaglia's
+//! polar method (Marsaglia and Bray 1964) with the logarithm of the `libm` crate, which has the
+//! same bits on every machine, unlike the platform's.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Which model a stream of numbers belongs to. The number is part of what makes a flight reproducible.
+/// Stream of a model. The number determines the values, so it must never change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub(crate) enum Stream {
@@ -56,12 +56,12 @@ pub(crate) enum Stream {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
     generator: ChaCha8Rng,
-    /// The polar method makes two variates at a time.
+    /// Second variate of a pair: the polar method produces two at a time.
     spare: Option<f64>,
 }
 
 impl Noise {
-    /// Stream number `stream` of `seed`.
+    /// The stream with this number of this seed.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
@@ -73,9 +73,9 @@ impl Noise {
         Self::new(seed, stream as u64)
     }
 
-    /// Uniform between 0 (included) and 1 (excluded).
+    /// Uniform between 0 (inclusive) and 1 (exclusive).
     pub fn unit(&mut self) -> f64 {
-        // 53 bits, the mantissa of an f64.
+        // 53 bits: the precision of an f64.
         (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
@@ -104,17 +104,18 @@ impl Noise {
         }
     }
 
-    /// A point of the square that the polar method draws from.
+    /// A point of the square in which the polar method draws.
     #[inline]
     pub(crate) fn point(&mut self) -> Point {
-        // One draw of 64 bits makes both coordinates; 32 bits each reach beyond six standard deviations.
+        // One draw of 64 bits gives both coordinates; 32 bits each reach beyond six standard
+        // deviations.
         let bits = self.generator.next_u64();
         let x = f64::from(bits as u32 as i32) * (1.0 / 2_147_483_648.0);
         let y = f64::from((bits >> 32) as u32 as i32) * (1.0 / 2_147_483_648.0);
         Point { x, y, square: x * x + y * y }
     }
 
-    /// The second variate of the last pair, if it has not been given yet.
+    /// The second variate of the last pair, if it has not been returned yet.
     pub(crate) fn take_spare(&mut self) -> Option<f64> {
         self.spare.take()
     }
@@ -135,14 +136,15 @@ pub(crate) struct Point {
 }
 
 impl Point {
-    /// In the unit circle, where the polar method takes it?
+    /// True inside the unit circle, where the polar method accepts the point.
     #[inline]
     pub(crate) fn is_inside(&self) -> bool {
-        // Both are asked, without a branch: one point in five is outside, and no processor foresees which.
+        // Without short circuit: one point in five is outside, which branch prediction cannot
+        // foresee.
         (self.square > 0.0) & (self.square < 1.0)
     }
 
-    /// The two normal variates that the polar method makes of a point in the circle.
+    /// The two normal variates of an accepted point.
     fn normals(&self) -> [f64; 2] {
         let scale = libm::sqrt(-2.0 * libm::log(self.square) / self.square);
         [self.x * scale, self.y * scale]

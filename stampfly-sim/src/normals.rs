@@ -1,28 +1,30 @@
-//! Normal variates for the models that use them by the thousand: made many at a time.
+//! Normal variates generated in blocks, for models that use thousands of them.
 //!
-//! [`Normals`] gives the numbers that [`Noise::normal`] would give, bit for bit. Made one by one, each waits for a logarithm,
-//! a division and a square root; made together, the next one's are under way meanwhile, and a pair that the polar method
-//! rejects is written over instead of branched around. Not for a model that also draws uniform numbers after the
-//! first normal one: what is made ahead has been taken from the stream.
+//! [`Normals`] gives the same numbers as [`Noise::normal`], bit for bit. In a block, the latencies
+//! of logarithm, division and square root overlap, and a pair that the polar method rejects is
+//! overwritten instead of branched around. Not for a model that draws uniform numbers after its
+//! first normal one, because a block takes values from the stream ahead of use.
 
 use crate::noise::Noise;
 
-/// Pairs made at a time.
+/// Pairs per block.
 const PAIRS: usize = 32;
 const LENGTH: usize = 2 * PAIRS;
 
-/// What is left of a stream of random numbers, as normal variates.
+/// The remainder of a random stream as normal variates.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Normals {
     noise: Noise,
     made: [f64; LENGTH],
-    /// Of `made`, already given.
+    /// Number of values of `made` already returned.
     given: usize,
 }
 
 impl From<Noise> for Normals {
     fn from(mut noise: Noise) -> Self {
         let (mut made, mut given) = ([0.0; LENGTH], LENGTH);
+        // The second variate of a pair already drawn from `noise` comes first, to keep its
+        // sequence.
         if let (Some(spare), Some(last)) = (noise.take_spare(), made.last_mut()) {
             *last = spare;
             given -= 1;
@@ -32,7 +34,7 @@ impl From<Noise> for Normals {
 }
 
 impl Normals {
-    /// The next `N`.
+    /// The next `N` variates.
     #[inline]
     pub(crate) fn next<const N: usize>(&mut self) -> [f64; N] {
         if let Some(next) = self.made.get(self.given..).and_then(<[f64]>::first_chunk) {
@@ -57,9 +59,10 @@ impl Normals {
         while found < PAIRS {
             let point = self.noise.point();
             (x[found], y[found], squares[found]) = (point.x, point.y, point.square);
+            // A rejected point is overwritten by the next one; no branch is needed.
             found += usize::from(point.is_inside());
         }
-        // As in `Point::normals`.
+        // Same operations as in `Point::normals`.
         let scales = squares.map(|square| (-2.0 * log_below_one(square) / square).sqrt());
         for (pair, ((x, y), scale)) in self.made.as_chunks_mut().0.iter_mut().zip(x.iter().zip(&y).zip(&scales)) {
             *pair = [x * scale, y * scale];
@@ -68,10 +71,10 @@ impl Normals {
     }
 }
 
-/// [`libm::log`] between 0 and 1, both excluded and not subnormal: the same operations in the same order, without the
-/// branches for other numbers, so that a compiler can take several numbers at a time.
+/// [`libm::log`] of a normal number between 0 and 1, both exclusive: the same operations in the
+/// same order without the branches for other numbers, so that the compiler can vectorise it.
 ///
-/// Its polynomials are fdlibm's (Sun Microsystems, `e_log.c`, 1993), as libm's are.
+/// The polynomials are those of fdlibm (Sun Microsystems, `e_log.c`, 1993), as in libm.
 #[inline]
 fn log_below_one(x: f64) -> f64 {
     const LN2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
@@ -81,7 +84,7 @@ fn log_below_one(x: f64) -> f64 {
     /// Upper half of the bits of √½.
     const ROOT: u64 = 0x3fe6_a09e << 32;
     const ONE: u64 = 0x3ff0_0000 << 32;
-    /// 2⁵²: numbers above it have no fraction, so an integer in the mantissa is one in the number.
+    /// 2⁵²: an f64 of this size has no fraction, so an integer placed in the mantissa is its value.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
 
     // x = 2ᵏ·(1 + f), with 1 + f from √½ to √2.
@@ -104,7 +107,7 @@ mod tests {
     #[test]
     fn the_logarithm_is_libms() {
         let mut noise = Noise::new(3, 9);
-        // The smallest and the largest square of a point that is inside, and what lies around where k changes.
+        // Smallest and largest square of an accepted point, and the surroundings of a change of k.
         let edges = [
             2f64.powi(-62),
             1.0 - f64::EPSILON / 2.0,

@@ -1,4 +1,4 @@
-//! Records a flight on a PC: the hash always, the log, wall times and inputs when asked for.
+//! Records a flight on a PC: always its hash; on request a log, run times and inputs.
 
 use crate::inputs::{Event, Inputs};
 use crate::vehicle::{Vehicle, Witness};
@@ -10,10 +10,11 @@ use stampfly_log::ulog::{Definitions, ParameterValue, Sink, WriteError};
 use stampfly_types::{Duration, Instant};
 use std::convert::Infallible;
 
-/// Time between two key frames in a log: a replay that starts anywhere begins at most this much later.
+/// Period of key frames in a log. A replay that starts at any instant begins at most this much
+/// later.
 const KEY_FRAME_PERIOD: Duration = Duration::from_secs(1);
 
-/// A log in memory.
+/// A log sink in memory.
 #[derive(Debug, Default)]
 pub struct Memory(pub Vec<u8>);
 
@@ -25,10 +26,11 @@ impl Sink for Memory {
     }
 }
 
-/// The beginning of every log of a vehicle: its name, facts, and every parameter, so that a replay flies with them.
+/// Writes the head of a log: the vehicle's name, `facts`, and all parameters, so that a replay uses
+/// the same ones.
 ///
 /// # Errors
-/// When the sink refuses.
+/// If the sink refuses the data.
 pub fn head<V: Vehicle, S: Sink>(
     sink: S,
     start: Instant,
@@ -46,28 +48,28 @@ pub fn head<V: Vehicle, S: Sink>(
     Ok(head)
 }
 
-/// Wall time one runnable took, over a flight.
+/// Wall-clock run time of one runnable over a flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timing {
-    /// Activations.
+    /// Number of activations.
     pub count: u64,
-    /// Sum, ns.
+    /// Total time, ns.
     pub total_ns: u64,
-    /// Longest, ns.
+    /// Longest time, ns.
     pub longest_ns: u64,
 }
 
-/// Records one flight of a vehicle, with its log in memory unless another sink is given.
+/// Records one flight of a vehicle. The log is in memory unless another sink is given.
 pub struct Recorder<V: Vehicle, S: Sink = Memory> {
     hash: FlightHash,
     log: Option<stampfly_flight::Recorder<V::Runnables, S>>,
-    /// The log, once the flight is over.
+    /// The log after the flight.
     written: Option<S>,
     timing: Option<Vec<Timing>>,
     started: Option<std::time::Instant>,
     inputs: Option<Inputs>,
     key_frame_due: Instant,
-    /// Samples that the taps have lost, and how often the state was replaced.
+    /// Samples lost by the taps, and replacements of the state.
     samples_lost: u32,
     replaced: u32,
     frame: Vec<u8>,
@@ -80,20 +82,21 @@ impl<V: Vehicle> Default for Recorder<V> {
 }
 
 impl<V: Vehicle> Recorder<V> {
-    /// Only the hash.
+    /// Records the hash only.
     #[must_use]
     pub fn hash_only() -> Self {
         Self::on(None)
     }
 
-    /// The hash and a ULog in memory. `facts` are written into its head.
+    /// Records the hash, and a ULog in memory with `facts` in its head.
     #[must_use]
     pub fn with_log(setup: &V::Setup, facts: &[(String, String)]) -> Self {
-        // The sink is memory, and the schema is the vehicle's own: this cannot fail.
+        // A sink in memory accepts everything, and the schema comes from the vehicle: this cannot
+        // fail.
         Self::with_sink(Memory::default(), setup, facts).unwrap_or_default()
     }
 
-    /// The log, once the flight is over; empty when there is none.
+    /// The log after the flight; empty without one.
     #[must_use]
     pub fn log(&self) -> &[u8] {
         self.written.as_ref().map_or(&[], |memory| &memory.0)
@@ -116,65 +119,66 @@ impl<V: Vehicle, S: Sink> Recorder<V, S> {
         }
     }
 
-    /// The hash and a ULog in a sink. `facts` are written into its head.
+    /// Records the hash, and a ULog into `sink` with `facts` in its head.
     ///
     /// # Errors
-    /// When the sink refuses the head.
+    /// If the sink refuses the head.
     pub fn with_sink(sink: S, setup: &V::Setup, facts: &[(String, String)]) -> Result<Self, WriteError<S::Error>> {
         let head = head::<V, _>(sink, V::options(setup).start, V::config(setup), facts)?;
         let log = head.data(LogSchema::new(V::BESIDE))?;
         Ok(Self::on(Some(stampfly_flight::Recorder::new(log))))
     }
 
-    /// The sink with the log so far, during the flight.
+    /// The sink with the log so far, during or after the flight.
     #[must_use]
     pub fn so_far(&self) -> Option<&S> {
         self.log.as_ref().map(stampfly_flight::Recorder::sink).or(self.written.as_ref())
     }
 
-    /// The sink with the log, once the flight is over.
+    /// The sink with the log, after the flight.
     #[must_use]
     pub const fn written(&self) -> Option<&S> {
         self.written.as_ref()
     }
 
-    /// The same, to keep.
+    /// As [`written`](Self::written), by value.
     #[must_use]
     pub fn into_written(self) -> Option<S> {
         self.written
     }
 
-    /// Messages that the sink has refused so far.
+    /// Messages refused by the sink so far.
     #[must_use]
     pub fn refused(&self) -> u32 {
         self.log.as_ref().map_or(0, stampfly_flight::Recorder::lost)
     }
 
-    /// Measures how long each runnable takes, too. Costs some tens of nanoseconds an activation.
+    /// Also measures the run time of each runnable, at a cost of some tens of nanoseconds per
+    /// activation.
     #[must_use]
     pub fn with_timing(self) -> Self {
         Self { timing: Some(vec![Timing::default(); V::Runnables::ACTIVATIONS.len()]), ..self }
     }
 
-    /// Collects what the vehicle is given, too.
+    /// Also collects the vehicle's inputs.
     #[must_use]
     pub fn with_inputs(self) -> Self {
         Self { inputs: Some(Inputs::default()), ..self }
     }
 
-    /// Hash over everything published so far.
+    /// Hash over all samples published so far.
     #[must_use]
     pub fn hash(&self) -> u64 {
         self.hash.finish()
     }
 
-    /// What the vehicle was given, in order; empty when it was not collected.
+    /// The vehicle's inputs in order; empty if they were not collected.
     #[must_use]
     pub fn into_inputs(self) -> Vec<Event> {
         self.inputs.unwrap_or_default().into_collected()
     }
 
-    /// Wall time per runnable, in table order; empty when it was not measured.
+    /// Run time per runnable in table order; empty if it was not measured.
     #[must_use]
     pub fn timing(&self) -> &[Timing] {
         self.timing.as_deref().unwrap_or_default()
@@ -189,7 +193,7 @@ impl<V: Vehicle, S: Sink> Observer for Recorder<V, S> {
         if let Some(log) = &mut self.log {
             log.has_read(activation);
         }
-        // From here, so that writing the log is not counted.
+        // Taken last, so that writing the log is not included in the measurement.
         if self.timing.is_some() {
             self.started = Some(std::time::Instant::now());
         }
@@ -239,10 +243,12 @@ impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
         loop {
             match key_frame::encode(flight_loop, clock, &mut self.frame) {
                 Ok(length) => {
-                    // What the sink refuses is counted.
+                    // The log counts messages that the sink refuses.
                     let _ = log.key_frame(clock, self.frame.get(..length).unwrap_or_default());
                     return;
                 }
+                // The size of the state is unknown in advance: the buffer grows until it fits and
+                // is reused afterwards.
                 Err(KeyFrameError::NoRoom) => self.frame.resize(2 * self.frame.len().max(4096), 0),
                 Err(_) => return,
             }
@@ -250,7 +256,8 @@ impl<V: Vehicle, S: Sink> Witness<V::Runnables> for Recorder<V, S> {
     }
 
     fn replaced(&mut self, clock: Instant) {
-        // Marked like a loss, and the key frame that a replay goes on from comes right behind it.
+        // The log marks the replacement like a loss, followed by a key frame from which a replay
+        // continues.
         self.replaced += 1;
         self.key_frame_due = clock;
         self.lost(clock, self.samples_lost);

@@ -1,6 +1,6 @@
-//! Root mean squares, as figures of a flight are.
+//! Root mean square of a series, for figures of a flight.
 
-/// Root mean square of what is added.
+/// Accumulates a root mean square.
 ///
 /// ```
 /// use stampfly_sim::Rms;
@@ -22,13 +22,13 @@ impl Rms {
         self.add_square(value * value);
     }
 
-    /// Adds a value whose square is known.
+    /// Adds a value given as its square, such as the squared norm of a vector.
     pub fn add_square(&mut self, square: f64) {
         self.sum += square;
         self.count += 1;
     }
 
-    /// `None` before the first.
+    /// The root mean square; `None` without values.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())

@@ -1,12 +1,13 @@
-//! A person who flies by sight: what they see, late, and what their hands do about it.
+//! A model pilot who flies by sight: delayed observation and stick response.
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! |---|---|
-//! | [`Eye`] | where the vehicle really is, 0.2 s ago |
-//! | [`Hand`] | from there to a place: which way to lean, how much throttle, which way to turn |
-//! | [`Places`] | a mission in places, as text, and how it is flown |
+//! | [`Eye`] | true position, velocity and heading, 0.2 s old |
+//! | [`Hand`] | controller from an observation and a target position to tilt, throttle and turn |
+//! | [`Places`] | a mission of target positions as text |
 //!
-//! For vehicles that are flown by sticks alone. What the sticks mean, and how they travel to the vehicle, is the vehicle's matter.
+//! For vehicles that take stick input only. The vehicle's crate maps [`Wish`] to stick positions
+//! and transmits them.
 
 use crate::World;
 use crate::time::Clock;
@@ -15,43 +16,44 @@ use core::str::FromStr;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3, frame};
 use std::collections::VecDeque;
 
-/// Between two looks.
+/// Period of observation.
 pub const LOOK: Duration = Duration::from_millis(20);
-/// Looks until a pilot reacts: 0.2 s, a trained person's reaction to what is seen.
+/// Reaction time in looks: 0.2 s, a trained person's reaction to a visual stimulus.
 const REACTION: usize = 10;
-/// How fast a person climbs, sinks and travels, m/s.
+/// Speeds of climb, descent and travel, m/s.
 const CLIMB: f32 = 0.5;
 const SINK: f32 = 0.4;
-/// And how fast the last bit, m, to set it down.
+/// Descent rate below [`LOW`], m/s.
 const SETS_DOWN: f32 = 0.2;
 const LOW: f32 = 0.3;
 const SPEED: f32 = 1.0;
-/// How fast the lean and the throttle that stay over a place are learned.
+/// Integrator gains for the tilt and throttle that hold a position: 1/s of tilt per metre, and
+/// throttle per m/s and look.
 const LEARNS_LEAN: f32 = 0.02;
 const LEARNS_THROTTLE: f32 = 0.001;
-/// A place is reached within these distances, m: beside and above.
+/// Horizontal and vertical distance within which a position is reached, m.
 const REACHED: [f32; 2] = [0.5, 0.3];
-/// A place that is not reached in this time is given up.
+/// Time after which a position that was not reached is skipped.
 const LONGEST_LEG: Duration = Duration::from_secs(30);
-/// Nobody leans further, in units of gravity.
+/// Largest tilt command, in units of gravity.
 const LEAN: f32 = 0.4;
 
-/// What was seen.
+/// One observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// World NED, from where it stood, m.
+    /// World NED, relative to the start, m.
     pub position: Vec3,
     /// World NED, m/s.
     pub velocity: Vec3,
     /// Heading, rad.
     pub yaw: f32,
-    /// Where the thrust pushes it, forward and right, in units of gravity.
+    /// Tilt: horizontal direction of the thrust, forward and right, in units of gravity.
     pub lean: [f32; 2],
-    /// It touches something.
+    /// Contact with the ground.
     pub contact: bool,
 }
 
-/// Somebody who looks at the vehicle.
+/// An observer of the vehicle with a reaction time.
 ///
 /// ```
 /// use stampfly_sim::sight::Eye;
@@ -68,16 +70,18 @@ pub struct Eye {
 }
 
 impl Eye {
-    /// From now on. Positions count from where the vehicle stands now.
+    /// Starts to observe. Positions are relative to the vehicle's present position.
     #[must_use]
     pub fn new(world: &World, now: Instant) -> Self {
         Self { world: world.clone(), spot: world.truth_at(now).position, past: VecDeque::new() }
     }
 
-    /// Looks. Call it once in [`LOOK`]: what is seen is ten looks old.
+    /// Observes the vehicle and returns the observation of ten looks ago (the present one until
+    /// there are ten). Call it every [`LOOK`].
     pub fn look(&mut self, now: Instant) -> Seen {
         let truth = self.world.truth_at(now);
         let yaw = frame::yaw(&truth.attitude);
+        // The thrust axis in the horizontal frame of the heading: its horizontal part is the tilt.
         let up = frame::from_yaw(-yaw) * (truth.attitude * Vec3::new(0.0, 0.0, -1.0));
         let seen = Seen {
             position: truth.position - self.spot,
@@ -91,18 +95,19 @@ impl Eye {
     }
 }
 
-/// What the hands want.
+/// Stick response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
-    /// Lean forward and to the right, in units of gravity.
+    /// Tilt forward and to the right, in units of gravity.
     pub lean: [f32; 2],
-    /// Throttle beside the one that hovers, a share.
+    /// Throttle relative to hover, as a share of the full range.
     pub throttle: f32,
-    /// How far to turn clockwise, rad.
+    /// Angle to turn clockwise, rad.
     pub turn: f32,
 }
 
-/// Somebody's hands, and what they have learned.
+/// The pilot's controller: proportional control of position and velocity, with learned hover
+/// throttle and trim.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hand {
     throttle: f32,
@@ -110,8 +115,10 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// To this place, or down to the ground below it, facing north.
+    /// One control step toward `place`, or down to the ground there if `sinks`, facing north. Call
+    /// it every [`LOOK`].
     pub fn steer(&mut self, seen: &Seen, place: Vec3, sinks: bool) -> Wish {
+        // Errors in the vehicle's heading frame, in which the sticks act.
         let ahead = frame::from_yaw(-seen.yaw);
         let (error, velocity) = (ahead * (place - seen.position), ahead * seen.velocity);
         let limit = |value: f32, most: f32| value.clamp(-most, most);
@@ -119,19 +126,21 @@ impl Hand {
             *learned = limit(*learned + LEARNS_LEAN * LOOK.seconds() * limit(error, 0.5), 0.3);
         }
         let axes = [(error.x, velocity.x, self.lean[0]), (error.y, velocity.y, self.lean[1])];
-        // 2 1/s of damping: two fifths of what the reaction time would bear.
+        // Velocity damping of 2 1/s: two fifths of what the reaction time allows.
         let lean = axes.map(|(error, velocity, learned)| {
             limit(2.0 * (limit(0.7 * error, SPEED) - velocity) / GRAVITY + learned, LEAN)
         });
         let sink = if -seen.position.z < LOW { SETS_DOWN } else { SINK };
         let climb = if sinks { -sink } else { limit(-0.8 * error.z, CLIMB) };
+        // World z points down: `velocity.z` is the sink rate, so this is the error of the climb
+        // rate.
         let wrong = climb + velocity.z;
         self.throttle = limit(self.throttle + LEARNS_THROTTLE * wrong, 0.2);
         Wish { lean, throttle: self.throttle + 0.12 * wrong, turn: -seen.yaw }
     }
 }
 
-/// Places to fly to one after another: take off to the first, land at the last.
+/// Positions to fly to in order: take off toward the first, land at the last.
 ///
 /// ```
 /// use stampfly_sim::sight::Places;
@@ -143,29 +152,30 @@ impl Hand {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Places(pub Vec<Leg>);
 
-/// A place, and how long to stay there.
+/// A position and the time to stay there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
-    /// World NED, from where it stood, m.
+    /// World NED, relative to the start, m.
     pub place: Vec3,
-    /// s.
+    /// Time to stay, s.
     pub stay: f32,
 }
 
-/// What a mission has come to, for whoever watches.
+/// Progress of a mission, shared with an observer.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Legs that were flown.
+    /// Legs flown.
     pub legs: Cell<usize>,
-    /// Is it at a place, flying?
+    /// Holding a position in the air.
     pub stays: Cell<bool>,
-    /// It is over.
+    /// The mission is over.
     pub finished: Cell<bool>,
 }
 
 impl Places {
-    /// Flies to one place after the other, stays there, and lands. `steer` looks, moves the sticks towards a place, or down to the ground there, and waits for
-    /// the next [look](LOOK).
+    /// Flies to each position in order, stays there, and lands at the last. `steer` observes, moves
+    /// the sticks toward a position (or, with `true`, down to the ground there) and waits for the
+    /// next [look](LOOK).
     pub async fn fly(&self, clock: &Clock, progress: &Progress, steer: &mut impl AsyncFnMut(Vec3, bool) -> Seen) {
         let mut last = Vec3::zeros();
         for Leg { place, stay } in &self.0 {

@@ -1,4 +1,4 @@
-//! A vehicle ready to fly: the world, the clock and the chips, made from one configuration and one seed.
+//! Builds a simulated vehicle from one configuration and one seed.
 
 use crate::conditions::Conditions;
 use crate::plant::{Airframe, Body, ParameterError, ParameterInfo, PlantParameters, Pose, WindConfig};
@@ -7,30 +7,32 @@ use crate::time::Clock;
 use crate::world::{Truth, World};
 use stampfly_types::Instant;
 
-/// All that decides a simulation. The same configuration gives the same bits on every machine.
+/// Configuration of a simulation. The same configuration gives the same bits on every machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationConfig<A = PlantParameters> {
-    /// Seed of everything random: specimens, noise, gusts.
+    /// Seed of all random values: specimens, noise, gusts.
     pub seed: u64,
-    /// What the clock shows at the start.
+    /// Time shown by the clock at the start.
     pub start: Instant,
-    /// The vehicle and its surroundings.
+    /// The airframe.
     pub plant: A,
-    /// The air.
+    /// Mean wind and gusts.
     pub wind: WindConfig,
-    /// What else it meets, beside the air: its battery's age, the light, how far specimens lie apart.
+    /// Battery age, floor, light, spread between specimens.
     pub conditions: Conditions,
-    /// Strength of propeller vibration; 1 is what was recorded, 0 is none.
+    /// Amplitude of propeller vibration relative to the recorded flights; 0 disables it.
     pub vibration: f64,
-    /// Strength of what the sensors of the recorded flights do not show: drift with temperature, and soft iron. 1 is what data sheets
-    /// allow, 0 is none.
+    /// Amplitude of temperature drift and soft iron, which the recorded flights do not show: 1 is
+    /// the data sheets' limit, 0 disables both.
     pub imperfections: f64,
-    /// Where it starts; `None` stands it on the floor at the origin, facing north.
+    /// Initial position and motion; `None` places the vehicle on the floor at the origin, facing
+    /// north.
     pub pose: Option<Pose>,
 }
 
 impl<A: Airframe> SimulationConfig<A> {
-    /// This vehicle with seed 1, standing on the floor of a room with people in it.
+    /// This airframe with seed 1, standing on the floor, in the default indoor air, without
+    /// imperfections.
     #[must_use]
     pub fn new(plant: A) -> Self {
         Self {
@@ -45,8 +47,8 @@ impl<A: Airframe> SimulationConfig<A> {
         }
     }
 
-    /// The same in the [harsh](Conditions::harsh) world of its seed, with a battery that carries a fifth more than the vehicle weighs: one that
-    /// carries less people put aside.
+    /// The same configuration in the [harsh](Conditions::harsh) world of its seed. Batteries are
+    /// redrawn until full throttle lifts 1.2 times the vehicle's weight.
     #[must_use]
     pub fn in_harsh_world(self) -> Self {
         let conditions =
@@ -54,10 +56,11 @@ impl<A: Airframe> SimulationConfig<A> {
         Self { conditions, ..self }
     }
 
-    /// Sets a number of the vehicle or, if it has none of this name, of the conditions.
+    /// Sets a parameter of the airframe or, if the airframe has none of this name, of the
+    /// conditions.
     ///
     /// # Errors
-    /// When there is no such number or the value makes no sense; nothing changes then.
+    /// If no parameter has this name or the value is out of range; nothing changes then.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
         match self.plant.set(name, value) {
             Err(ParameterError::Unknown(_)) => self.conditions.set(name, value),
@@ -65,13 +68,13 @@ impl<A: Airframe> SimulationConfig<A> {
         }
     }
 
-    /// Every number that [`set`](Self::set) takes.
+    /// All parameters that [`set`](Self::set) accepts.
     #[must_use]
     pub fn list(&self) -> Vec<ParameterInfo> {
         self.plant.list().into_iter().chain(self.conditions.iter()).collect()
     }
 
-    /// Are these numbers together a vehicle that can be simulated?
+    /// Checks that the parameters together describe a vehicle that can be simulated.
     ///
     /// # Errors
     /// [`ParameterError::Together`] with the reason.
@@ -80,12 +83,12 @@ impl<A: Airframe> SimulationConfig<A> {
     }
 }
 
-/// What a battery has to lift that somebody flies with, in weights, at full throttle: 30° of lean need 1.15 to hold the height, and the rest is
-/// what a flight drains.
+/// Least lift at full throttle, in weights, with which a vehicle is flown: holding height at 30° of
+/// tilt needs 1.15, the rest covers the discharge during a flight.
 const SPARE_LIFT: f64 = 1.2;
 
 impl SimulationConfig {
-    /// [`PlantParameters::EXAMPLE`], a vehicle that nobody built: for examples and tests.
+    /// [`PlantParameters::EXAMPLE`], a fictitious quadrotor for examples and tests.
     #[must_use]
     pub fn example() -> Self {
         Self::new(PlantParameters::EXAMPLE)
@@ -94,8 +97,8 @@ impl SimulationConfig {
 
 /// One simulated vehicle.
 ///
-/// The parts are public and independent handles: hand `sensors` to the flight stack's tasks, keep `world` to look at
-/// the truth, and let [`Tasks`](crate::time::Tasks) move `clock`.
+/// The parts are public, independent handles: give `sensors` to the tasks of the flight stack, keep
+/// `world` to read the true state, and let [`Tasks`](crate::time::Tasks) advance `clock`.
 ///
 /// ```
 /// use stampfly_drivers::{Imu, MotorOutputs};
@@ -119,20 +122,22 @@ impl SimulationConfig {
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
-    /// Virtual time.
+    /// Virtual time, shared by all parts.
     pub clock: Clock,
     /// The vehicle in its surroundings.
     pub world: World,
-    /// The chips.
+    /// Sensors and motors.
     pub sensors: Sensors,
 }
 
 impl Simulation {
-    /// A vehicle at the start.
+    /// A vehicle at the configured start.
     #[must_use]
     pub fn new<A: Airframe>(config: &SimulationConfig<A>) -> Self {
         let clock = Clock::new(config.start);
         let body = config.plant.body_under(&config.conditions, &config.wind, config.pose.as_ref(), config.seed);
+        // The body takes the conditions that act on it above; the world keeps those that act on
+        // sensors.
         let world = World::new(body, config.start)
             .with_imperfections(config.imperfections)
             .with_conditions(config.conditions.clone());
@@ -140,8 +145,9 @@ impl Simulation {
         Self { clock, world, sensors }
     }
 
-    /// A body of one's own at the start, with all the chips, on a clock that shows zero. `seed` is of everything random in the chips. The
-    /// body says by itself where it stands and what shakes it.
+    /// Puts a custom body on a clock that starts at zero, with all sensors and without recorded
+    /// vibration. `seed` feeds the sensors' random values. The body defines its own initial pose
+    /// and its own vibration.
     ///
     /// ```
     /// use stampfly_sim::plant::{Body, Motion};
@@ -169,7 +175,7 @@ impl Simulation {
         Self { clock, world, sensors }
     }
 
-    /// What is really the case now.
+    /// The true state at the clock's present time.
     #[must_use]
     pub fn truth(&self) -> Truth {
         self.world.truth_at(self.clock.now())

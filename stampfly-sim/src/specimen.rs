@@ -1,24 +1,24 @@
-//! What is wrong with the sensors of one vehicle, as nature has it: the reference for every calibration.
+//! True sensor errors of one simulated vehicle: the reference for every calibration.
 //!
-//! Models and emulated chips draw it from the seed; nobody on the vehicle can see it. Not the noise, which is no error that could be
-//! corrected.
+//! Sensor models and chip emulators draw them from the seed; flight code has no access to them.
+//! Noise is not included because calibration cannot remove it.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Errors of the sensors, body FRD. What is measured is `matrix · true + offset`.
+/// Sensor errors, body FRD: measured = `matrix · true + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specimen {
     /// Accelerometer: scale and misalignment.
     pub accel_matrix: Matrix3<f64>,
-    /// Accelerometer: its place, from the centre of mass, body, m.
+    /// Accelerometer: position relative to the centre of mass, body, m.
     pub lever: Vector3<f64>,
-    /// Accelerometer: offset at the beginning and at 25 °C, m/s².
+    /// Accelerometer: offset at the start and at 25 °C, m/s².
     pub accel_bias: Vector3<f64>,
-    /// Accelerometer: change of the offset, m/s² a kelvin.
+    /// Accelerometer: temperature coefficient of the offset, m/s²/K.
     pub accel_drift: Vector3<f64>,
-    /// Gyro: offset at the beginning and at 25 °C, rad/s.
+    /// Gyro: offset at the start and at 25 °C, rad/s.
     pub gyro_bias: Vector3<f64>,
-    /// Gyro: change of the offset, rad/s a kelvin.
+    /// Gyro: temperature coefficient of the offset, rad/s/K.
     pub gyro_drift: Vector3<f64>,
     /// Magnetometer: soft iron.
     pub soft_iron: Matrix3<f64>,
@@ -27,7 +27,7 @@ pub struct Specimen {
 }
 
 impl Default for Specimen {
-    /// Sensors that are right.
+    /// Sensors without errors.
     fn default() -> Self {
         let (none, straight) = (Vector3::zeros(), Matrix3::identity());
         Self {

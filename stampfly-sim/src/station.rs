@@ -1,14 +1,14 @@
-//! A simulated ground station, and the missions in latitude and longitude that it flies.
+//! A simulated ground station that flies missions in latitude and longitude (feature `ground`).
 //!
 //! ```text
 //! take-off; 36.5627,136.7,60; 36.5627,136.6972,60; hold 30; land
 //! ```
 //!
-//! Places are latitude and longitude, degrees, and height above home, m. `hold` stays at the last place for so many seconds. Behind `land` a new flight may begin. The station does what a person with a telephone does:
-//! waits until the vehicle knows where it is, arms it, starts the mission, and is heard all the time. For vehicles that take commands and know where on Earth they are; for those that are flown by sticks see
-//! [`sight`](crate::sight).
-//!
-//! With feature `ground`.
+//! A waypoint is latitude and longitude in degrees and height above home in m. `hold` stays at the
+//! last waypoint for a number of seconds. Another flight may begin after `land`. The station waits
+//! until the vehicle has an origin and no arming blocks, arms it, starts the mission, and keeps the
+//! link alive. For vehicles that accept guided commands and know their geographic position; for
+//! vehicles that take stick input only use [`sight`](crate::sight).
 
 use crate::sight::Progress;
 use crate::time::Clock;
@@ -20,22 +20,22 @@ use stampfly_services::{Cockpit, Hands, Helm, Places, Samples, Seat, Seated, Vie
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant, Origin, Vec3};
 
-/// Between two turns of the station.
+/// Period of the station.
 const TURN: Duration = Duration::from_millis(20);
-/// Once the vehicle knows where it is, the station waits so long for the estimate to settle.
+/// Time for which the vehicle has to be ready before it is armed, so that its estimate settles.
 const SETTLES: Duration = Duration::from_secs(5);
 
-/// One item.
+/// One mission item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Item {
     TakeOff,
-    /// Ten-millionths of a degree, and m above home.
+    /// Latitude and longitude, 10⁻⁷ degrees, and height above home, m.
     Place(i32, i32, f32),
     Hold(f32),
     Land,
 }
 
-/// What to fly: flights, each from a take-off to a landing.
+/// A mission: one or more flights, each from take-off to landing.
 ///
 /// ```
 /// use stampfly_sim::station::Mission;
@@ -84,19 +84,19 @@ fn item(text: &str) -> Option<Item> {
 }
 
 impl Mission {
-    /// Is there nothing to fly?
+    /// True if there is nothing to fly.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many items there are.
+    /// Number of items.
     #[must_use]
     pub fn items(&self) -> usize {
         self.0.iter().map(Vec::len).sum()
     }
 
-    /// The steps of a flight.
+    /// The mission steps of one flight. `hold` repeats the last waypoint with a stay.
     fn steps(flight: &[Item], origin: &Origin, height: f32) -> Vec<Step> {
         let mut place = Vec3::zeros();
         let step = |item: &Item| match *item {
@@ -115,35 +115,37 @@ impl Mission {
     }
 }
 
-/// The ground station.
+/// The ground station at the other end of a vehicle's link.
 pub struct Station<'a, H, S> {
     clock: Clock,
     helm: Helm,
     hands: H,
     places: Places,
     newest: &'a RefCell<S>,
-    /// While this is true nothing gets through.
+    /// While true, the link is interrupted in both directions.
     silent: &'a Cell<bool>,
 }
 
 impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
-    /// One at the other end of the link of a vehicle with these hands, of which these are the topics.
+    /// A station for a vehicle with these `hands` and `topics`. It reads samples from `newest`.
     #[must_use]
     pub fn new(clock: &Clock, hands: H, topics: &[TopicInfo], newest: &'a RefCell<S>, silent: &'a Cell<bool>) -> Self {
         Self { clock: clock.clone(), helm: Helm::new(), hands, places: Places::of(topics), newest, silent }
     }
 
-    /// Flies it. A vehicle without a take-off height of its own takes off to `height`, m; a place is reached within `reach`, m.
+    /// Flies the mission. A vehicle without a take-off height of its own climbs to `height`, m; a
+    /// waypoint is reached within `reach`, m.
     pub async fn fly(mut self, Mission(flights): &Mission, [height, reach]: [f32; 2], progress: &Progress) {
         for flight in flights {
             self.wait_until_ready().await;
             let Some(origin) = self.seat(|cockpit, _| cockpit.origin()) else { return };
+            // Positions are relative to the origin, which is known only when the vehicle is ready.
             let steps = Mission::steps(flight, &origin, height);
             let mut runner = Runner::new(height, reach);
             let armed = |cockpit: &mut dyn Cockpit| cockpit.view().state().armed;
             while !self.seat(|cockpit, _| armed(cockpit)) {
                 self.seat(|cockpit, now| {
-                    // Refused while the queue is full: asked again.
+                    // The request is refused while the queue is full; the loop repeats it.
                     let _ = cockpit.guide(
                         now,
                         Seat::Console,
@@ -156,7 +158,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
                 let _ = runner.start(now, Seat::Console, cockpit);
             });
             let before = progress.legs.get();
-            // A mission that the failsafe has taken over is not taken back.
+            // The loop ends on disarming: a mission that a failsafe has taken over is not resumed.
             while !runner.is_finished() && self.seat(|cockpit, _| armed(cockpit)) {
                 let current = if self.silent.get() {
                     runner.current()
@@ -171,6 +173,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
                 progress.legs.set(before + current.min(steps.len()));
                 self.turn().await;
             }
+            // The vehicle disarms during the last step, landing, before the runner has counted it.
             if runner.current() + 1 >= steps.len() {
                 progress.legs.set(before + steps.len());
             }
@@ -178,8 +181,9 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
         progress.finished.set(true);
     }
 
-    /// Waits until it would arm, and a little longer.
+    /// Waits until the vehicle has been ready to arm for [`SETTLES`].
     async fn wait_until_ready(&mut self) {
+        // Restarts whenever the vehicle becomes unready, so the time counts from the last change.
         let mut since = self.clock.now();
         loop {
             let is_ready = self.seat(|cockpit, _| {
@@ -205,7 +209,7 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
         self.clock.sleep_until(now + TURN).await;
     }
 
-    /// The vehicle, for one call.
+    /// Gives `call` access to the vehicle.
     fn seat<T>(&mut self, call: impl FnOnce(&mut dyn Cockpit, Instant) -> T) -> T {
         let newest = self.newest.borrow();
         let view = View::new(&*newest, &self.places);

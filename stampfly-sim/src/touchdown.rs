@@ -1,27 +1,28 @@
-//! Where and how an aeroplane has touched down on a strip.
+//! Assesses where and how an aeroplane touches down on a strip.
 //!
-//! Seen from beside it: the truth, not what the aircraft thinks. A touch counts as a landing after the aircraft was high; the bounces behind it do not. For vehicles that land where they are see
-//! [`watched`](crate::watched).
+//! Works on the true motion, not on the aircraft's estimate. A touch counts as a landing only after
+//! the wheels have been higher than 3 m, so bounces are not counted. For vehicles that land
+//! vertically use [`watched`](crate::watched).
 
 use crate::Truth;
 use crate::vehicle::Figure;
 use stampfly_types::{Vec3, frame, math};
 
-/// Higher than this it flies, m.
+/// Height of the wheels above which the aircraft counts as airborne, m.
 const FLEW: f32 = 3.0;
 
 /// One touchdown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touchdown {
-    /// Past the aiming point, m.
+    /// Distance past the aiming point, m.
     pub past: f32,
-    /// To the right of the strip's middle, m.
+    /// Distance to the right of the centre line, m.
     pub across: f32,
-    /// Rate of sink, m/s.
+    /// Sink rate, m/s.
     pub sink: f32,
-    /// Bank, rad.
+    /// Bank angle, rad.
     pub bank: f32,
-    /// From the nose to the direction over the ground, rad.
+    /// Angle from the heading to the course over the ground, rad.
     pub crab: f32,
 }
 
@@ -41,28 +42,32 @@ pub struct Touchdown {
 pub struct Touchdowns {
     /// Direction of the strip, rad.
     strip: f32,
-    /// From the aiming point to the origin, where the strip's middle is, m.
+    /// Distance from the aiming point to the origin, the middle of the strip, m.
     rolling: f32,
     all: Vec<Touchdown>,
-    /// It has been high since the last one.
+    /// The aircraft has been airborne since the last touchdown.
     flew: bool,
-    /// Rate of sink before this look.
+    /// Sink rate at the previous call: at the touch itself the ground has already slowed it.
     sink: f32,
 }
 
 impl Touchdowns {
-    /// On a strip of this direction, rad, through the origin, to either side. A landing aims at a point `rolling` before the origin, m.
+    /// A strip through the origin with direction `strip`, rad, usable both ways. A landing aims at
+    /// a point `rolling` metres before the origin.
     #[must_use]
     pub fn new(strip: f32, rolling: f32) -> Self {
         Self { strip, rolling, ..Self::default() }
     }
 
-    /// Looks for one. `height` of the wheels, m.
+    /// Checks for a touchdown. `height` is the height of the wheels, m. Call it at regular
+    /// intervals.
     pub fn look(&mut self, height: f32, truth: &Truth) {
+        // Hysteresis: bounces below this height belong to the same landing.
         self.flew |= height > FLEW;
         if truth.contact && self.flew {
             self.flew = false;
             let heading = frame::yaw(&truth.attitude);
+            // The strip can be used from both ends; distances count in the direction of landing.
             let towards = if math::cos(heading - self.strip) > 0.0 { 1.0 } else { -1.0 };
             let (sin, cos) = math::sin_cos(self.strip);
             let Vec3 { x, y, .. } = truth.position;
@@ -76,16 +81,17 @@ impl Touchdowns {
                 crab: math::wrap_angle(course - heading),
             });
         }
+        // Kept for the next call: at contact the ground has already reduced the sink rate.
         self.sink = truth.velocity.z;
     }
 
-    /// All of them.
+    /// All touchdowns in order.
     #[must_use]
     pub fn all(&self) -> &[Touchdown] {
         &self.all
     }
 
-    /// How many, and the worst of each number.
+    /// Number of touchdowns and the worst value of each quantity.
     #[must_use]
     pub fn figures(&self) -> [Figure; 6] {
         let worst = |of: &dyn Fn(&Touchdown) -> f32| self.all.iter().map(of).reduce(f32::max).map(f64::from);

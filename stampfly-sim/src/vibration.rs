@@ -1,13 +1,14 @@
-//! What turning propellers do to an inertial sensor.
+//! Vibration of an inertial sensor caused by the propellers.
 //!
-//! Three parts per axis, all growing with the square of rotor speed like every aerodynamic and centrifugal force:
-//! tones at each rotor's speed and at twice that (imbalance, two blades passing an arm), broadband noise (flow,
-//! brushes), and broadband noise through a resonance of the airframe. On top, the accelerometer reads a little
-//! less than gravity while it shakes: the rectification that all the recorded flights show (about +0.8 m/s² on z).
+//! Three parts per axis, all proportional to the square of rotor speed, as aerodynamic and
+//! centrifugal forces are: tones at each rotor's speed and at twice that (imbalance; two blades
+//! passing an arm), broadband noise (flow, brushes), and broadband noise through a resonance of the
+//! airframe. In addition the accelerometer reads less than gravity while it vibrates: a
+//! rectification that all recorded flights show (about +0.8 m/s² on z).
 //!
-//! It is sampled at the chip's own rate and before any decimation, so what folds back below the control loop's
-//! Nyquist frequency is real folding, at frequencies that follow the rotors. The amplitudes are fitted to recorded
-//! flights; `cargo run --release -p stampfly-lab --example spectra` repeats the comparison.
+//! Sampled at the chip's rate before decimation, so aliasing below the control loop's Nyquist
+//! frequency is real and follows the rotors. The amplitudes are fitted to recorded flights; `cargo
+//! run --release -p stampfly-lab --example spectra` repeats the comparison.
 
 use crate::noise::Noise;
 use crate::normals::Normals;
@@ -16,19 +17,19 @@ use crate::plant::ROTORS;
 /// Axes: accelerometer x, y, z, then gyroscope x, y, z.
 const AXES: usize = 6;
 
-/// Strength of the vibration on one axis with all rotors at hover speed.
+/// Vibration of one axis with all rotors at hover speed.
 struct Profile {
     /// Standard deviation of the broadband part per sample.
     broadband: f64,
-    /// Resonance of the airframe: frequency and bandwidth in Hz, standard deviation.
+    /// Resonance of the airframe: frequency, Hz; bandwidth, Hz; standard deviation.
     resonance: (f64, f64, f64),
-    /// Root mean square of the tones at once and twice the rotors' speed, all rotors together.
+    /// RMS of the tones at once and twice the rotor speed, all rotors together.
     tones: [f64; 2],
     /// Constant offset.
     rectification: f64,
 }
 
-/// Fitted to the flight records, m/s² and rad/s.
+/// Fitted to the flight records; m/s² and rad/s.
 const PROFILES: [Profile; AXES] = [
     Profile { broadband: 5.7, resonance: (165.0, 70.0, 2.0), tones: [2.0, 1.5], rectification: 0.0 },
     Profile { broadband: 1.2, resonance: (145.0, 50.0, 1.1), tones: [0.7, 0.7], rectification: 0.0 },
@@ -38,7 +39,7 @@ const PROFILES: [Profile; AXES] = [
     Profile { broadband: 0.0165, resonance: (165.0, 80.0, 0.005), tones: [0.005, 0.008], rectification: 0.0 },
 ];
 
-/// The strengths of [`PROFILES`], side by side.
+/// The entries of [`PROFILES`] as arrays over the axes.
 const BROADBAND: [f64; AXES] = of_axes(0);
 const RESONANT: [f64; AXES] = of_axes(1);
 const RECTIFICATION: [f64; AXES] = of_axes(2);
@@ -53,9 +54,10 @@ const fn of_axes(part: usize) -> [f64; AXES] {
     parts
 }
 
-/// A resonance of every axis: two poles each, and zeros at zero and at half the sample rate, so that its skirts fall.
+/// A resonance on every axis: two poles each, and zeros at 0 and at half the sample rate to
+/// attenuate both sides.
 ///
-/// Everything that is per axis lies side by side here and below, so that the axes are computed side by side, too.
+/// All data are arrays over the axes, so that the compiler can vectorise over them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Resonators {
     feedback: [[f64; AXES]; 2],
@@ -65,15 +67,16 @@ struct Resonators {
 }
 
 impl Resonators {
-    /// Of these frequencies and bandwidths, Hz. Unit variance out for white noise of unit variance in.
+    /// Resonances with these frequencies and bandwidths, Hz. White noise of unit variance gives an
+    /// output of unit variance.
     fn new(resonances: [(f64, f64); AXES], dt: f64) -> Self {
         use core::f64::consts::{PI, TAU};
         let (mut feedback, mut gain) = ([[0.0; AXES]; 2], [0.0; AXES]);
         for (axis, (frequency, bandwidth)) in resonances.into_iter().enumerate() {
             let radius = libm::exp(-PI * bandwidth * dt);
             let (a1, a2) = (2.0 * radius * libm::cos(TAU * frequency * dt), -radius * radius);
-            // Variance and autocorrelation of the second-order autoregression w = a1·w₁ + a2·w₂ + x (Box and Jenkins),
-            // from which the output is the difference w − w₂.
+            // Variance and autocorrelation of the second-order autoregression w = a1·w₁ + a2·w₂ + x
+            // (Box and Jenkins); the output is the difference w − w₂.
             let variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) * (1.0 - a2) - a1 * a1));
             let lag_two = a1 * a1 / (1.0 - a2) + a2;
             gain[axis] = 1.0 / (2.0 * variance * (1.0 - lag_two)).sqrt();
@@ -93,7 +96,7 @@ impl Resonators {
     }
 }
 
-/// Weights of a tone's cosine and sine on each axis. Apart, so that the axes can be added up side by side.
+/// Weights of a tone's cosine and sine on each axis, as separate arrays for vectorisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tone {
     cos: [f64; AXES],
@@ -116,23 +119,24 @@ pub(crate) struct Vibration {
     /// 1 / hover speed, s/rad.
     per_hover: f64,
     phases: Phases,
-    /// Of each tone of each rotor.
+    /// Tones of each rotor.
     weights: [[Tone; 2]; ROTORS],
     resonators: Resonators,
 }
 
 impl Vibration {
-    /// `factor` scales all of the recorded disturbance alike, its rectified part included; `dt` is the sample period in seconds.
+    /// `factor` scales the whole recorded disturbance including rectification; `dt` is the sample
+    /// period, s.
     pub(crate) fn new(factor: f64, dt: f64, hover_speed: f64, mut noise: Noise) -> Self {
         let phase = [(); ROTORS].map(|()| libm::sincos(noise.within(core::f64::consts::PI)));
         let weights = [(); ROTORS].map(|()| {
-            // No two propellers are balanced alike.
+            // Propellers differ in balance.
             let balance = 1.0 + noise.within(0.5);
             core::array::from_fn(|harmonic| {
                 let mut tone = Tone { cos: [0.0; AXES], sin: [0.0; AXES] };
                 for (axis, profile) in PROFILES.iter().enumerate() {
                     let (sin, cos) = libm::sincos(noise.within(core::f64::consts::PI));
-                    // Four rotors add in power; a tone's amplitude is √2 of its root mean square.
+                    // Rotors add in power; the amplitude of a tone is √2 times its RMS.
                     let amplitude = balance * profile.tones[harmonic] * (2.0 / ROTORS as f64).sqrt();
                     (tone.cos[axis], tone.sin[axis]) = (amplitude * cos, amplitude * sin);
                 }
@@ -144,7 +148,7 @@ impl Vibration {
         Self { noise: noise.into(), factor, dt, per_hover: 1.0 / hover_speed, phases, weights, resonators }
     }
 
-    /// The next sample, accelerometer (m/s²) then gyroscope (rad/s), at these rotor speeds (rad/s).
+    /// The next sample, accelerometer, m/s², then gyroscope, rad/s, at these rotor speeds, rad/s.
     pub(crate) fn step(&mut self, rotor_speed: &[f64; ROTORS]) -> [f64; AXES] {
         let mut total = [0.0; AXES];
         if self.factor <= 0.0 {
@@ -157,6 +161,7 @@ impl Vibration {
             let relative = rotor_speed[rotor] * self.per_hover;
             let share = relative * relative;
             power += share / ROTORS as f64;
+            // Double-angle formulas give the second harmonic without another rotation.
             let harmonics = [(cos, sin), (cos * cos - sin * sin, 2.0 * sin * cos)];
             for ((cos, sin), tone) in harmonics.into_iter().zip(tones) {
                 for ((sum, a), b) in total.iter_mut().zip(&tone.cos).zip(&tone.sin) {
@@ -164,6 +169,7 @@ impl Vibration {
                 }
             }
         }
+        // Standing rotors: no noise is drawn, so a vehicle at rest is cheap.
         if power < 1e-4 {
             return [0.0; AXES];
         }
@@ -177,10 +183,11 @@ impl Vibration {
 }
 
 impl Phases {
-    /// Turns each point by its angle, radians (0 to 8).
+    /// Rotates each point by its angle, rad (0 to 8).
     ///
-    /// Sine and cosine of an eighth of the angle by series, then three doublings; the result is pulled back onto the
-    /// circle, so errors do not add up. Some thirty multiplications, the same on every machine.
+    /// Sine and cosine of an eighth of the angle by series, then three angle doublings. The result
+    /// is renormalised towards the circle, so errors do not accumulate. About thirty
+    /// multiplications, with the same bits on every machine.
     fn turn(&mut self, angles: &[f64; ROTORS]) {
         for (rotor, angle) in angles.iter().enumerate() {
             let x = angle * 0.125;

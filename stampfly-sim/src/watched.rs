@@ -1,7 +1,9 @@
-//! How a flight looks from beside the field, and which end it was: for vehicles that take off, land and are disarmed.
+//! Assesses a flight from its true motion and gives it an outcome class.
 //!
-//! [`Watched`] is a vehicle's `Outcome`, a [`Spectator`] looks for it. What a vehicle measures besides, and when that is too much, is its [`Measured`]. Not for vehicles with a judge of
-//! their own, which looks at alerts and phases.
+//! For vehicles that take off, land and are disarmed. [`Watched`] is the vehicle's `Outcome`, and a
+//! [`Spectator`] samples the truth for it. Quantities particular to a vehicle, and the limits at
+//! which they degrade the outcome, go into its [`Measured`]. Not for vehicles with their own judge
+//! that evaluates alerts and phases.
 
 use crate::fault::{Class, FAULT_ACTED, Fault, Injector, Moment};
 use crate::time::Clock;
@@ -10,60 +12,62 @@ use crate::{Truth, World};
 use serde::Serialize;
 use stampfly_types::{Duration, Instant, Message, frame};
 
-/// Above this nothing touches the ground any more, m.
+/// Height above which nothing touches the ground, m.
 const CLEAR: f64 = 0.1;
-/// Faster than this a touch is a crash, m/s.
+/// Speed at a touch above which it is a crash, m/s.
 const HARD: f32 = 2.5;
-/// After its end a flight is watched for this long.
+/// Time for which a flight is observed after its end.
 const TAIL: Duration = Duration::from_secs(1);
-/// A vehicle that stands more tilted than this lies, rad.
+/// Tilt above which a vehicle on the ground counts as tipped over, rad.
 const LIES: f32 = 0.5;
-/// So long after its take-off it has flown for a while: [`Moment::Hover`].
+/// Time after take-off at which [`Moment::Hover`] comes.
 const FLOWN: Duration = Duration::from_secs(1);
 
-/// How a vehicle is at a look, beside the truth: what only it can say of itself.
+/// State of the vehicle at a look, as far as the true motion does not show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// It stands and may be armed.
+    /// On the ground and ready to arm.
     pub ready: bool,
-    /// It is armed.
+    /// Armed.
     pub armed: bool,
-    /// Above where it stood, m.
+    /// Height above the place of take-off, m.
     pub height: f64,
-    /// It stays at a place, where a touch of the ground is no landing.
+    /// Holds a position; touching the ground there is not a landing.
     pub stays: bool,
-    /// It flies to another place.
+    /// Flies to another position.
     pub moves: bool,
-    /// It sinks, in order to land.
+    /// Descends in order to land.
     pub lands: bool,
-    /// Its motors are told to turn.
+    /// Its motors are commanded to turn.
     pub turns: bool,
-    /// In how many steps something has touched the ground that does not carry it there, as
-    /// [`Body::scrapes`](crate::plant::Body::scrapes) counts them.
+    /// Steps so far in which a part that does not carry the vehicle touched the ground, see
+    /// [`Body::scrapes`](crate::plant::Body::scrapes).
     pub scrapes: u64,
-    /// How far it is from where it is to be, m.
+    /// Distance from the intended position, m.
     pub beside: f64,
 }
 
-/// What one kind of vehicle measures of its flights.
+/// Quantities that one kind of vehicle measures in its flights.
 pub trait Measured {
-    /// Farther than this from where it is to be, m, it has flown away. By default it never has.
+    /// Distance from the intended position above which the vehicle has flown away, m. Unlimited by
+    /// default.
     const AWAY: f64 = f64::INFINITY;
 
-    /// Was the mission flown with larger errors than a flight without faults has?
+    /// True if the mission was flown with larger errors than a flight without faults has.
     fn is_degraded(&self) -> bool;
 
-    /// How hard a touch of the ground is, m/s. Faster than 2.5 m/s it is a crash. By default the whole velocity; what rolls on wheels has another answer.
+    /// Impact speed of a touch, m/s; above 2.5 m/s it is a crash. By default the magnitude of the
+    /// velocity. A vehicle on wheels overrides it, because rolling is not an impact.
     #[must_use]
     fn touch(truth: &Truth) -> f32 {
         truth.velocity.norm()
     }
 
-    /// The figures, the same names in the same order for every flight.
+    /// The figures: the same names in the same order for every flight.
     fn figures(&self) -> Vec<Figure>;
 }
 
-/// How a flight went.
+/// Course and outcome of a flight.
 ///
 /// ```
 /// use stampfly_sim::Truth;
@@ -90,59 +94,59 @@ pub trait Measured {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Watched<M> {
-    /// Was the mission flown to its end?
+    /// The mission was flown to its end.
     pub finished: bool,
-    /// Legs flown, and how many there were.
+    /// Legs flown, and legs of the mission.
     pub legs: [usize; 2],
-    /// It has been armed.
+    /// Has been armed.
     pub armed: bool,
-    /// Is it disarmed in the end?
+    /// Disarmed at the end.
     pub disarmed: bool,
-    /// It was disarmed in the air.
+    /// Disarmed in the air.
     pub cut: bool,
-    /// Other programs flew it.
+    /// Flown by other programs.
     pub live: bool,
-    /// A stick file flew it: a person's sticks may fly a sound vehicle into the ground.
+    /// Flown by a stick file: recorded sticks may fly a sound vehicle into the ground.
     pub by_sticks: bool,
-    /// Speed at the hardest touch after flight, m/s: a bounce does not make it a soft one.
+    /// Speed at the hardest touch after flight, m/s. A soft bounce does not lower it.
     pub touchdown: f32,
-    /// The crash, if there was one.
+    /// The first crash.
     pub crash: Option<Crash>,
-    /// Farthest from where it was to be while it was armed, m.
+    /// Largest distance from the intended position while armed, m.
     pub farthest: f64,
     /// Largest tilt, rad.
     pub tilt: f32,
-    /// At the end.
+    /// True state at the end.
     pub last: Truth,
-    /// The faults, with how often each changed something.
+    /// The faults, each with the number of samples or commands that it changed.
     pub faults: Vec<(String, u64)>,
-    /// The worst end that is acceptable with these faults; `None` without faults.
+    /// The worst acceptable class with these faults; `None` without faults.
     pub expected: Option<Class>,
-    /// What the vehicle measures besides.
+    /// Further quantities of the vehicle.
     pub measured: M,
     /// When it left the ground for the first time.
     left: Option<Instant>,
-    /// It touched the ground at the last look, this fast if it does.
+    /// Contact at the previous look.
     touched: bool,
     speed: f32,
     scrapes: u64,
     is_armed: bool,
 }
 
-/// A crash: the first one of a flight, unless the motors had stopped in the air before.
+/// The first crash of a flight. Ground contact after the motors stopped in the air is not one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crash {
-    /// When.
+    /// Instant of the crash.
     pub at: Instant,
     /// Speed at the touch, m/s.
     pub speed: f32,
-    /// Something touched that does not carry it: no wheel and no foot.
+    /// A part that does not carry the vehicle touched the ground: neither wheel nor foot.
     pub scraped: bool,
-    /// How long its motors were still told to turn, the last time that they were.
+    /// Time from the crash to the last look at which the motors were commanded to turn.
     pub turned: Duration,
 }
 
-/// Somebody beside the field: looks at the truth at regular times, writes it down, and sees when a flight is over.
+/// Samples the truth at a fixed period, records it, and detects the end of the flight.
 ///
 /// ```
 /// use stampfly_sim::watched::Spectator;
@@ -169,13 +173,14 @@ pub struct Spectator {
 }
 
 impl Spectator {
-    /// Who looks so often.
+    /// Looks once per `every`.
     #[must_use]
     pub fn new(clock: &Clock, world: &World, every: Duration) -> Self {
         Self { clock: clock.clone(), world: world.clone(), every, looked: None, looks: 0, ended: None }
     }
 
-    /// The truth, and when it was, if it is time to look. It is recorded as the first topic beside the vehicle's.
+    /// Returns the truth and its instant if a look is due. Hands it to `record` as the first topic
+    /// of [`Vehicle::BESIDE`](crate::vehicle::Vehicle::BESIDE).
     pub fn look(&mut self, record: &mut dyn FnMut(usize, Instant, u32, &[u32])) -> Option<(Instant, Truth)> {
         let now = self.clock.now();
         if self.looked.is_some_and(|looked| now.since(looked) < self.every) {
@@ -188,22 +193,22 @@ impl Spectator {
         Some((now, truth))
     }
 
-    /// Is a flight over? A second after the mission was flown to its `end`; as long after a vehicle that was `cut` in the air has come to rest; when a fault has
-    /// lasted longer than anybody waits.
+    /// True one second after the first of: the mission has reached its `end`; a vehicle that was
+    /// `cut` in the air has touched the ground; the first fault has lasted longer than `patience`.
     pub fn is_over(&mut self, now: Instant, end: bool, cut: bool, injector: &Injector, patience: Duration) -> bool {
         let ended = end || cut && self.world.truth_at(now).contact;
         let given_up = injector.first_begun(now).is_some_and(|begun| now.since(begun) > patience);
         (ended || given_up) && now.since(*self.ended.get_or_insert(now)) >= TAIL
     }
 
-    /// The truth now.
+    /// The true state now.
     #[must_use]
     pub fn truth(&self) -> Truth {
         self.world.truth_at(self.clock.now())
     }
 }
 
-/// What scripts want to know besides.
+/// Findings for scripts: fields of the JSON object that describes the flight.
 #[derive(Debug, Serialize)]
 struct Findings {
     outcome: &'static str,
@@ -215,7 +220,7 @@ struct Findings {
 }
 
 impl<M: Measured + Default> Watched<M> {
-    /// Before a flight of so many legs.
+    /// Before a flight of `legs` legs.
     #[must_use]
     pub fn new(legs: usize) -> Self {
         Self { legs: [0, legs], ..Self::default() }
@@ -223,18 +228,22 @@ impl<M: Measured + Default> Watched<M> {
 }
 
 impl<M: Measured> Watched<M> {
-    /// Looks at the truth and at what the vehicle shows, and tells the injector which moments have come.
+    /// Evaluates the truth and the vehicle's state, and reports reached moments to the injector.
+    /// Call it at every look.
     pub fn look(&mut self, now: Instant, shown: &Shown, truth: &Truth, injector: &Injector) {
         let Shown { ready, armed, height, stays, moves, lands, turns, scrapes, beside } = *shown;
+        // Compression and small hops on the feet stay below this height and do not count as flight.
         let is_clear = height > CLEAR;
         self.armed |= armed;
         self.is_armed = armed;
         if armed && is_clear {
             self.left.get_or_insert(now);
         }
+        // Disarmed before the first take-off is not a cut, even if a person lifts the vehicle.
         self.cut |= !armed && is_clear && self.has_flown();
+        // Only the first look of a contact counts, and none while a position is held on purpose.
         let touches = truth.contact && !self.touched && self.has_flown() && !is_clear && !stays;
-        // The ground slows it down within a look.
+        // Contact decelerates the vehicle within one look: the speed before it counts, too.
         let speed = self.speed.max(M::touch(truth));
         self.look_for_crash(now, truth, speed, scrapes, turns);
         (self.touched, self.speed) = (truth.contact, M::touch(truth));
@@ -261,26 +270,31 @@ impl<M: Measured> Watched<M> {
     }
 
     fn look_for_crash(&mut self, now: Instant, truth: &Truth, speed: f32, scrapes: u64, turns: bool) {
-        // What tips over when its motors stand already, and slowly, breaks nothing.
+        // Tipping over slowly with the motors already off causes no damage.
         let scraped = scrapes > self.scrapes && self.armed && (turns || truth.velocity.norm() > HARD);
         let hit = truth.contact && !self.touched && self.has_flown() && speed > HARD;
         self.scrapes = scrapes;
+        // A vehicle cut in the air falls; its impact is a consequence of the cut, not a crash of
+        // its own.
         if (scraped || hit) && !self.cut {
             self.crash.get_or_insert(Crash { at: now, speed, scraped, turned: Duration::ZERO });
         }
+        // Updated as long as the motors turn, so that it ends at the last look at which they did.
         if let Some(crash) = self.crash.as_mut().filter(|_| turns) {
             crash.turned = now.since(crash.at);
         }
     }
 
-    /// Is nothing more to come of it, because it has crashed or was stopped in the air, and is
-    /// disarmed?
+    /// True when nothing more can happen: the vehicle was cut in the air, or has crashed and is
+    /// disarmed.
     #[must_use]
     pub const fn is_out(&self) -> bool {
         self.cut || self.crash.is_some() && !self.is_armed
     }
 
-    /// The flight is over: with these faults, of which the injector knows what each has changed. What people break on purpose is not judged.
+    /// Ends the flight. `faults` are those given at its start; faults that a user injects during the
+    /// flight do not change the acceptable class. `injector` supplies how often each fault acted;
+    /// without it the counts are 0.
     pub fn end(&mut self, faults: &[Fault], injector: Option<&Injector>, last: Truth, armed: bool) {
         self.last = last;
         self.disarmed = self.armed && !armed;
@@ -289,7 +303,7 @@ impl<M: Measured> Watched<M> {
         self.faults = faults.iter().enumerate().map(|(place, fault)| (fault.to_string(), changes(place))).collect();
     }
 
-    /// Has it left the ground?
+    /// True once it has left the ground.
     #[must_use]
     pub const fn has_flown(&self) -> bool {
         self.left.is_some()
@@ -301,9 +315,11 @@ impl<M: Measured> Watched<M> {
 }
 
 impl<M: Measured> Watched<M> {
-    /// Which end it is.
+    /// The class of the outcome.
     #[must_use]
     pub fn class(&self) -> Class {
+        // The first condition that applies decides. A cut vehicle falls and may end on its back, so
+        // a cut is checked before the final attitude.
         if !self.armed {
             Class::Refused
         } else if self.farthest > M::AWAY {
@@ -325,8 +341,8 @@ impl<M: Measured> Watched<M> {
         }
     }
 
-    /// Why it is no better end: a sentence without a capital letter, empty when the mission was
-    /// flown as if nothing had happened.
+    /// Why the outcome is not better: a sentence without a capital letter, empty when the mission
+    /// was flown without degradation.
     #[must_use]
     pub fn reason(&self) -> String {
         let crashed = self.crash.map(|crash| {
@@ -355,8 +371,8 @@ impl<M: Measured> Watched<M> {
         }
     }
 
-    /// The worst end that is acceptable. Without faults the mission has to be flown to its end;
-    /// sticks may end anywhere.
+    /// The worst acceptable class. Without faults the mission has to be flown to its end; a stick
+    /// file may end in any class up to a crash.
     fn worst(&self) -> Class {
         let worst = self.expected.unwrap_or(Class::Degraded);
         if self.by_sticks { worst.max(Class::Crashed) } else { worst }
@@ -368,6 +384,8 @@ impl<M: Measured> Verdict for Watched<M> {
         if self.live {
             return true;
         }
+        // With faults the class alone decides: a vehicle may rightly land before its mission is
+        // finished.
         let flown = self.facts().iter().all(|(_, holds)| *holds);
         let is_within =
             if self.by_sticks { self.class() <= self.worst() } else { self.class().is_within(self.worst()) };
@@ -391,6 +409,7 @@ impl<M: Measured> Verdict for Watched<M> {
         let landed = self.finished && self.stands() && self.touchdown <= HARD;
         let mut facts = vec![("landed", landed), ("disarmed", self.disarmed), ("finished", self.finished)];
         if self.by_sticks {
+            // Sticks may end in the air or on the ground upside down.
             facts.remove(0);
         }
         facts
@@ -445,7 +464,8 @@ mod tests {
         }
     }
 
-    /// Height and rate of sink, a look each, from the take-off on, and when disarmed again: how did it end?
+    /// Flies a take-off and one look per pair of height and sink rate, disarms, and returns the
+    /// class.
     fn flown(looks: &[(f64, f32)]) -> Class {
         let (mut watched, injector) = (Watched::<Nothing>::new(0), Injector::new(Instant::ZERO, &[]));
         let mut last = Truth::default();
@@ -465,8 +485,8 @@ mod tests {
         assert_eq!(flown(&[(0.0, 0.0), (2.0, 9.0), (0.0, 9.0), (1.0, 0.5), (0.0, 0.5)]), Class::Crashed);
     }
 
-    /// One that hits the ground at the third look, and whose motors turn until it is disarmed at
-    /// this one.
+    /// A vehicle that hits the ground at the third look, and whose motors turn until it is disarmed
+    /// at look `disarmed`.
     fn crashed(disarmed: u64) -> Watched<Nothing> {
         let (mut watched, injector) = (Watched::<Nothing>::new(0), Injector::new(Instant::ZERO, &[]));
         let mut last = Truth::default();

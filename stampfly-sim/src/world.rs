@@ -1,8 +1,9 @@
-//! The world that all sensors of one vehicle share.
+//! The physical world shared by all sensors of one vehicle.
 //!
-//! A [`World`] is a handle: clones see the same vehicle. Physics runs lazily, up to the instant somebody asks for,
-//! and the recent past is kept, so a sensor may report what was true in the middle of its exposure although another
-//! one has already been read later. Many worlds fit in one process; none knows of another.
+//! A [`World`] is a handle; clones refer to the same vehicle. Physics runs lazily, in fixed steps,
+//! up to the latest instant requested. The last 80 ms of motion are kept, so a sensor can report
+//! the middle of its exposure after another sensor has already been read at a later instant. Worlds
+//! are independent of each other.
 
 use crate::conditions::Conditions;
 use crate::plant::{Body, DT, Motion, Plant, ROTORS, RotorFault, STEP, Scene};
@@ -14,7 +15,7 @@ use stampfly_types::{Duration, Instant, Quat, Vec3, message};
 use std::rc::Rc;
 
 message! {
-    /// What is really the case: the reference for every estimate.
+    /// True state of the vehicle: the reference for every estimate.
     pub struct Truth {
         /// Body FRD → world NED.
         attitude: Quat,
@@ -28,21 +29,23 @@ message! {
         specific_force: Vec3 ["m/s^2"],
         /// Velocity of the air at the vehicle, world NED.
         wind: Vec3 ["m/s"],
-        /// Rotor speeds: front right, rear right, rear left, front left; of an aeroplane the propeller, and nothing else.
+        /// Rotor speeds: front right, rear right, rear left, front left. An aeroplane has its
+        /// propeller first and zeros after it.
         rotor_speed: [f32; 4] ["rad/s"],
         /// Battery voltage under load.
         battery_voltage: f32 ["V"],
         /// Battery current.
         battery_current: f32 ["A"],
-        /// Does anything touch the ground?
+        /// True while any part touches the ground.
         contact: bool,
     }
 }
 
-/// Steps of the past that are kept: 80 ms, longer than any sensor's exposure and read-out.
+/// Number of past steps kept: 80 ms, longer than exposure and read-out of any sensor.
 const HISTORY: usize = 128;
 
-/// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8° west.
+/// The Earth's field in Kanazawa, world NED, µT (World Magnetic Model, rounded): 49° of dip, 8°
+/// west.
 const KANAZAWA: [f64; 3] = [30.8, -4.3, 36.4];
 
 #[derive(Debug)]
@@ -51,16 +54,16 @@ struct State {
     gravity: f64,
     field: Vector3<f64>,
     start: Instant,
-    /// Steps done since the start.
+    /// Steps since the start.
     steps: u64,
-    /// Motion after step k at index k modulo its length, for all but the last step, whose motion is the body's: it is copied
-    /// when it has come to rest in memory.
+    /// Motion after step k at index k modulo the length. The motion after the last step is read
+    /// from the body instead and is copied here when the next step begins.
     history: Box<[Motion; HISTORY]>,
-    /// Of the sensors.
+    /// Strength of the sensors' imperfections.
     imperfections: f64,
     conditions: Conditions,
     specimen: Specimen,
-    /// Warmer than it is by itself: from what to what, K, from when on and for how long.
+    /// Heating: from and to, K; begin; duration.
     warmth: (f64, f64, Instant, Duration),
 }
 
@@ -68,20 +71,26 @@ impl State {
     fn advance_to(&mut self, instant: Instant) {
         let wanted = instant.since(self.start).as_micros() / STEP.as_micros();
         while self.steps < wanted {
+            // The motion is copied one step late: by now it has settled in memory, so the copy does
+            // not wait for the physics that computed it.
             self.history[self.steps as usize % HISTORY] = *self.body.motion();
             self.body.step();
             self.steps += 1;
         }
     }
 
-    /// The motion after the last step before `instant`, and the time since, s.
+    /// The motion after the last step at or before `instant`, and the time since that step, s.
     fn before(&mut self, instant: Instant) -> (&Motion, f64) {
         self.advance_to(instant);
         let since_start = instant.since(self.start).as_micros();
+        // Older steps have been overwritten: the oldest one kept stands in for them.
         let oldest = self.steps.saturating_sub(HISTORY as u64 - 1);
         let step = (since_start / STEP.as_micros()).max(oldest);
         let rest = since_start.saturating_sub(step * STEP.as_micros()) as f64 * 1e-6;
+        // The newest motion is not in the history yet.
         let motion = if step == self.steps { self.body.motion() } else { &self.history[step as usize % HISTORY] };
+        // `rest` exceeds a step only for an instant older than the history; the extrapolation is
+        // valid for one step.
         (motion, rest.min(DT))
     }
 
@@ -93,7 +102,7 @@ impl State {
     }
 }
 
-/// What an inertial sensor is exposed to, in the units and frames of [`Motion`].
+/// Input of an inertial sensor, in the units and frames of [`Motion`].
 pub(crate) struct Inertial {
     pub specific_force: Vector3<f64>,
     pub rate: Vector3<f64>,
@@ -137,14 +146,16 @@ impl World {
         })))
     }
 
-    /// The same, with sensors of this strength of imperfection, [`SimulationConfig::imperfections`](crate::SimulationConfig::imperfections).
+    /// Sets the strength of sensor imperfections, see
+    /// [`SimulationConfig::imperfections`](crate::SimulationConfig::imperfections).
     #[must_use]
     pub fn with_imperfections(self, strength: f64) -> Self {
         self.0.borrow_mut().imperfections = strength;
         self
     }
 
-    /// The same under these conditions, as far as sensors meet them. What a body meets of them it is [made with](crate::plant::Airframe::body_under).
+    /// Sets the conditions that act on sensors. Conditions that act on the body are given when it
+    /// is [made](crate::plant::Airframe::body_under).
     #[must_use]
     pub fn with_conditions(self, conditions: Conditions) -> Self {
         self.0.borrow_mut().conditions = conditions;
@@ -155,7 +166,7 @@ impl World {
         self.0.borrow().conditions.clone()
     }
 
-    /// The same in another magnetic field than Kanazawa's, world NED, µT.
+    /// Replaces the magnetic field of Kanazawa, world NED, µT.
     #[must_use]
     pub fn with_field(self, field: [f64; 3]) -> Self {
         self.0.borrow_mut().field = field.into();
@@ -170,7 +181,7 @@ impl World {
         self.0.borrow().imperfections
     }
 
-    /// What is wrong with the sensors.
+    /// True errors of the sensors.
     #[must_use]
     pub fn specimen(&self) -> Specimen {
         self.0.borrow().specimen
@@ -180,30 +191,32 @@ impl World {
         note(&mut self.0.borrow_mut().specimen);
     }
 
-    /// Warms the vehicle by so many kelvins above what it is by itself, evenly within this time from `instant` on; cools it when it
-    /// is warmer.
+    /// Ramps the vehicle's temperature to `by` kelvins above its undisturbed temperature, linearly
+    /// during `within` from `instant` on. A smaller value than the present one cools it.
     pub fn warm(&self, instant: Instant, by: f64, within: Duration) {
         let now = self.warmth_at(instant);
         self.0.borrow_mut().warmth = (now, by, instant, within);
     }
 
-    /// How much warmer it is than by itself, K.
+    /// Temperature above the undisturbed one, K.
     #[must_use]
     pub fn warmth_at(&self, instant: Instant) -> f64 {
         let (from, to, begun, length) = self.0.borrow().warmth;
+        // The lower bound avoids a division by zero for a step change.
         let share = instant.since(begun).seconds_f64() / length.seconds_f64().max(1e-6);
         from + (to - from) * share.clamp(0.0, 1.0)
     }
 
-    /// Runs the physics up to `instant`. The past does not change.
+    /// Runs the physics up to `instant`. An earlier instant has no effect.
     pub fn advance_to(&self, instant: Instant) {
         self.0.borrow_mut().advance_to(instant);
     }
 
-    /// The motion at `instant`: in the future, which then becomes the present, or up to 80 ms in the past.
+    /// The motion at `instant`: in the future, to which the physics then advances, or up to 80 ms
+    /// in the past.
     ///
-    /// Between two physics steps it is carried on from the earlier one, so that a motor command given at the same
-    /// instant still acts on the next step.
+    /// Between two physics steps the motion is extrapolated from the earlier step, so that a motor
+    /// command of the same instant still acts on the next step.
     #[must_use]
     pub fn motion_at(&self, instant: Instant) -> Motion {
         self.0.borrow_mut().motion_at(instant)
@@ -213,23 +226,25 @@ impl World {
     pub fn set_duty(&self, instant: Instant, duty: [f64; ROTORS]) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
+        // The steps before the command have been computed with the old duty by now.
         state.body.set_duty(duty);
     }
 
-    /// Breaks or mends a rotor, in motor order from 0, from `instant` on.
+    /// Sets the fault of a rotor from `instant` on; motors count from 0 in motor order.
     pub fn set_rotor_fault(&self, instant: Instant, rotor: usize, fault: RotorFault) {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
         state.body.set_rotor_fault(rotor, fault);
     }
 
-    /// Changes what stands around a multirotor, from `instant` on. `change` gets the motion there. Nothing can stand around other bodies.
+    /// Changes the scene around a multirotor from `instant` on. `change` receives the motion at
+    /// that instant. Bodies of other kinds have no scene: nothing happens.
     pub fn change_scene(&self, instant: Instant, change: impl FnOnce(&mut Scene, &Motion)) {
         let motion = self.motion_at(instant);
         self.change(instant, |plant: &mut Plant| change(plant.scene_mut(), &motion));
     }
 
-    /// Changes a body of this kind from `instant` on; `None` when it is of another kind.
+    /// Changes a body of type `B` from `instant` on. Returns `None` if the body has another type.
     pub fn change<B: Body, T>(&self, instant: Instant, change: impl FnOnce(&mut B) -> T) -> Option<T> {
         let mut state = self.0.borrow_mut();
         state.advance_to(instant);
@@ -247,7 +262,8 @@ impl World {
         state.body.scene().floor(&position) - position.z
     }
 
-    /// What shakes and turns an inertial sensor at `instant`, as in [`motion_at`](Self::motion_at) without the rest.
+    /// Acceleration, rate and rotor speeds at `instant`: [`motion_at`](Self::motion_at) restricted
+    /// to what an inertial sensor needs.
     pub(crate) fn inertial_at(&self, instant: Instant) -> Inertial {
         let mut state = self.0.borrow_mut();
         let (motion, rest) = state.before(instant);
@@ -259,19 +275,20 @@ impl World {
         }
     }
 
-    /// Looks at the body as it is after the last step.
+    /// Reads the body in its state after the last step.
     pub fn inspect<T>(&self, look: impl FnOnce(&dyn Body) -> T) -> T {
         look(&*self.0.borrow().body)
     }
 
-    /// Looks at a body of this kind as it is after the last step; `None` when it is of another kind.
+    /// Reads a body of type `B` in its state after the last step. Returns `None` if the body has
+    /// another type.
     pub fn inspect_as<B: Body, T>(&self, look: impl FnOnce(&B) -> T) -> Option<T> {
         let state = self.0.borrow();
         let body: &dyn Any = &*state.body;
         body.downcast_ref().map(look)
     }
 
-    /// The truth at `instant`.
+    /// The true state at `instant`.
     #[must_use]
     pub fn truth_at(&self, instant: Instant) -> Truth {
         let motion = self.motion_at(instant);

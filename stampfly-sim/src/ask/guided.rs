@@ -1,64 +1,64 @@
-//! What steers a vehicle: guided commands and sticks, and the messages they become.
+//! Guided commands and sticks in requests, and their conversion to messages.
 
 use super::AskError;
 use serde::{Deserialize, Serialize};
 use stampfly_types::Vec3;
 use stampfly_types::messages::{FlightMode, GuidedCommand, GuidedKind, PilotInput};
 
-/// A guided command: what programs ask of a vehicle.
+/// A guided command.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Guided {
-    /// Allow the motors.
+    /// Arm the motors.
     Arm {},
     /// Land if flying, then stop the motors.
     Disarm {},
-    /// Rise.
+    /// Take off.
     TakeOff {
-        /// Above the present place, m, above 0 and at most [`HIGHEST`].
+        /// Height above the present position, m, from 0.05 to [`HIGHEST`].
         height: f32,
     },
-    /// Forget the route, and go there.
+    /// Discard the route and fly to a position.
     GoTo {
-        /// Relative to the origin, m.
+        /// North of the origin, m.
         north: f32,
-        /// Relative to the origin, m.
+        /// East of the origin, m.
         east: f32,
         /// Above the origin, m.
         up: f32,
-        /// Heading at the goal, rad from north, clockwise.
+        /// Heading at the target, rad from north, clockwise.
         yaw: f32,
-        /// Highest speed, m/s; 0, or left out, is the vehicle's default.
+        /// Largest speed, m/s; 0 (the default) selects the vehicle's.
         #[serde(default)]
         speed: f32,
-        /// Time to stay there, s.
+        /// Time to stay at the target, s.
         #[serde(default)]
         dwell: f32,
     },
-    /// Forget the route and stay here.
+    /// Discard the route and hold the present position.
     Hold {},
-    /// Land here.
+    /// Land at the present position.
     Land {},
-    /// Motors off now.
+    /// Stop the motors immediately.
     Kill {},
-    /// Turn over once.
+    /// Flip once.
     Flip {
-        /// Which way.
+        /// Direction.
         direction: Direction,
     },
-    /// Tune one rate loop, from a hover; any other command ends it.
+    /// Tune one rate loop in hover; any other command ends it.
     Autotune {
-        /// Which one.
+        /// Axis.
         axis: Axis,
     },
 }
 
-/// Highest take-off, m.
+/// Largest take-off height, m.
 pub const HIGHEST: f32 = 100.0;
-/// Farthest way-point along each axis, m.
+/// Largest coordinate of a waypoint along north and east, m.
 pub const FARTHEST: f32 = 1000.0;
 
-/// Which way to turn over.
+/// Direction of a flip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -76,11 +76,11 @@ pub enum Direction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// Forward.
+    /// About the forward axis.
     Roll,
-    /// Right.
+    /// About the right axis.
     Pitch,
-    /// Down.
+    /// About the down axis.
     Yaw,
 }
 

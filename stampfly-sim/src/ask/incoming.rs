@@ -1,35 +1,36 @@
-//! What a client may send: an ask of a vehicle, or one of the server itself.
+//! Requests of a client: to a vehicle, or to the server.
 
 use super::{AskError, Asked, object, printable};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-/// Any text of a client: an ask of a vehicle, or of the server itself.
+/// A request of a client.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incoming {
-    /// From now on, send the state of these topics this often: `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
+    /// Send the state of these topics at this rate:
+    /// `{"id":1,"do":"subscribe","topics":["estimate_state"],"rate":50}`.
     Subscribe {
-        /// The answer carries it.
+        /// Repeated in the answer.
         id: u32,
         /// Names of topics, at most [`MOST_TOPICS`].
         topics: Vec<String>,
-        /// Texts a second, 1 to [`FASTEST_RATE`].
+        /// Messages per second, 1 to [`FASTEST_RATE`].
         rate: u8,
     },
-    /// This is the page that was told this session before its connection broke, and goes on as it: `{"id":1,"do":"resume","session":"…"}`.
+    /// Resume the session of a page whose connection broke: `{"id":1,"do":"resume","session":"…"}`.
     Resume {
-        /// The answer carries it.
+        /// Repeated in the answer.
         id: u32,
-        /// As the server has told it.
+        /// Session identifier given by the server.
         session: String,
     },
-    /// Of a vehicle.
+    /// A request to a vehicle.
     Ask(Asked),
 }
 
-/// Most topics a client can subscribe to.
+/// Largest number of topics in a subscription.
 pub const MOST_TOPICS: usize = 64;
-/// Most state texts a second.
+/// Largest rate of state messages, 1/s.
 pub const FASTEST_RATE: u8 = 50;
 
 #[derive(Deserialize)]
@@ -50,10 +51,10 @@ struct Subscribe {
 }
 
 impl Incoming {
-    /// Reads a text.
+    /// Parses a request.
     ///
     /// # Errors
-    /// The id, as far as there is one, and why it is refused.
+    /// The id, 0 without one, and the reason for the refusal.
     pub fn parse(text: &str) -> Result<Self, (u32, AskError)> {
         let mut object = object(text).map_err(|error| (0, error))?;
         let id = object.get("id").and_then(Value::as_u64).and_then(|id| u32::try_from(id).ok());

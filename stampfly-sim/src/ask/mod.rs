@@ -1,14 +1,13 @@
-//! What a page or another program asks of a vehicle: JSON as it arrives, and what it means.
+//! Requests of a page or another program to a vehicle, as JSON.
 //!
-//! Use it on both sides: a server makes an [`Asked`] of every text that arrives, the vehicle
-//! carries it out and answers with a [`Reply`]. Nothing here knows a particular vehicle. [`Guided`]
-//! becomes the [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] the
-//! [`PilotInput`](stampfly_types::messages::PilotInput) that every radio link of the project ends
-//! in.
+//! Used at both ends: a server parses every message into an [`Asked`], and the vehicle carries it
+//! out and answers with a [`Reply`]. Independent of any particular vehicle: [`Guided`] becomes a
+//! [`GuidedCommand`](stampfly_types::messages::GuidedCommand) and [`Sticks`] a
+//! [`PilotInput`](stampfly_types::messages::PilotInput), the messages of all radio links.
 //!
-//! An ask is a JSON object with `vehicle` (its number), `id` (chosen by the page; the answer
-//! repeats it), `do`, and what belongs to it. With `at` it says when it was asked, so that what was
-//! held up on its way is not done:
+//! A request is a JSON object with `vehicle` (its number), `id` (chosen by the page and repeated in
+//! the answer), `do`, and the fields of this request. An optional `at` is the time of the request,
+//! by which delayed requests are refused:
 //!
 //! ```
 //! use stampfly_sim::ask::{Ask, Asked, Guided};
@@ -21,8 +20,8 @@
 //! # Ok::<(), stampfly_sim::ask::AskError>(())
 //! ```
 //!
-//! Strict on purpose: a field that is not known, a number that is not finite or out of its range, a
-//! text that is too long refuse the whole ask.
+//! Parsing is strict: an unknown field, a number that is not finite or out of range, or a text that
+//! is too long refuses the whole request.
 
 mod guided;
 mod incoming;
@@ -36,41 +35,41 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;
 
-/// Longest ask, bytes.
+/// Longest request, bytes.
 pub const LONGEST: usize = 4096;
-/// Longest text within an ask (a console line, a fault, a name), bytes.
+/// Longest text within a request (a console line, a fault, a name), bytes.
 pub const LONGEST_TEXT: usize = 256;
-/// Latest `at`, ms: thirty years.
+/// Largest `at`, ms: thirty years.
 const LATEST: f64 = 1e12;
-/// Highest number of a vehicle.
+/// Largest number of a vehicle.
 const VEHICLES: u64 = 1000;
 
-/// One thing that is asked of one vehicle.
+/// A request to one vehicle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
     /// Number of the vehicle, from 0.
     pub vehicle: usize,
-    /// Chosen by the page; the answer carries it.
+    /// Chosen by the page and repeated in the answer.
     pub id: u32,
-    /// When it was asked, ms, by the clock that the server tells its pages. An ask without it
-    /// counts as asked when it arrives.
+    /// Time of the request, ms, by the clock that the server announces to its pages. Without it the
+    /// time of arrival counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<f64>,
-    /// What is asked.
+    /// The request.
     #[serde(flatten)]
     pub ask: Ask,
 }
 
-/// What can be asked.
+/// Content of a request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Ask {
     /// A guided command.
     Guided(Guided),
-    /// Sticks and switches, sent again and again while somebody flies by hand. Has no answer.
+    /// Stick and switch positions, sent repeatedly during manual flight. Not answered.
     Sticks(Sticks),
-    /// Somebody is there: to be said at least every second, or the vehicle takes the link for lost.
-    /// Has no answer.
+    /// Keep-alive, at least once a second; otherwise the vehicle declares the link lost. Not
+    /// answered.
     Alive {},
     /// Changes a parameter.
     ParamSet {
@@ -79,62 +78,61 @@ pub enum Ask {
         /// The new value, in the parameter's unit.
         value: f32,
     },
-    /// Asks for a parameter's value.
+    /// Reads a parameter.
     ParamGet {
         /// Its name.
         name: String,
     },
-    /// Keeps the parameters for the next start.
+    /// Saves the parameters for the next start.
     ParamSave {},
-    /// A line for the vehicle's console; the answer's text is what the console says.
+    /// A line for the vehicle's console. The answer contains the console's output.
     Console {
-        /// Without its end.
+        /// The line without terminator.
         line: String,
     },
-    /// Turns one motor of the disarmed vehicle, for as long as the vehicle's own limit. Repeated
+    /// Runs one motor of the disarmed vehicle for at most the vehicle's own time limit. Repeated
     /// while a button is held.
     MotorTest {
-        /// From 1.
+        /// Number of the motor, from 1.
         motor: u8,
-        /// Share of the full duty, 0 to 1.
+        /// Duty, 0 to 1.
         duty: f32,
     },
     /// Stops the motor test.
     MotorStop {},
-    /// A fault, as [`Fault::parse`](crate::fault::Fault::parse) reads it. One whose time is past
-    /// (`@0`) begins at once, and lasts its seconds from then.
+    /// Injects a fault in the syntax of [`Fault::parse`](crate::fault::Fault::parse). A begin in
+    /// the past (`@0`) means now; the duration counts from then.
     Fault {
         /// The text.
         text: String,
     },
-    /// Ends every fault.
+    /// Ends all faults.
     FaultClear {},
-    /// Virtual seconds in a second of the wall; 0 pauses.
+    /// Sets the speed of virtual time relative to the wall clock; 0 pauses.
     Speed {
-        /// At most [`FASTEST`].
+        /// Factor, at most [`FASTEST`].
         factor: f32,
     },
 }
 
-/// Most virtual seconds in a second of the wall.
+/// Largest speed factor.
 pub const FASTEST: f32 = 100.0;
 
-/// Why an ask was refused.
+/// Why a request was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AskError {
-    /// More than [`LONGEST`] bytes, or a text in it of more than [`LONGEST_TEXT`].
+    /// More than [`LONGEST`] bytes, or a text of more than [`LONGEST_TEXT`] bytes.
     TooLong,
-    /// No JSON object.
+    /// Not a JSON object.
     NotJson,
-    /// `vehicle` or `id` is missing or no such number.
+    /// This number is missing, not an integer, or too large.
     Missing(&'static str),
-    /// Not one of the asks, a field too many or too few, or of another type; the sentence says
-    /// which.
+    /// Unknown request, unknown or missing field, or wrong type; the text names it.
     Unknown(String),
-    /// This number is not in its range.
+    /// This value is out of its range.
     OutOfRange(&'static str),
-    /// A text with control characters.
+    /// A text contains control characters.
     NotPrintable,
 }
 
@@ -153,7 +151,7 @@ impl fmt::Display for AskError {
 
 impl std::error::Error for AskError {}
 
-/// The object in this text.
+/// Parses the text as a JSON object.
 fn object(text: &str) -> Result<Map<String, Value>, AskError> {
     if text.len() > LONGEST {
         return Err(AskError::TooLong);
@@ -162,15 +160,16 @@ fn object(text: &str) -> Result<Map<String, Value>, AskError> {
 }
 
 impl Asked {
-    /// Reads an ask.
+    /// Parses a request.
     ///
     /// # Errors
-    /// [`AskError`] when it is not exactly one.
+    /// [`AskError`] if the text is not a valid request.
     pub fn parse(text: &str) -> Result<Self, AskError> {
         Self::from_object(object(text)?)
     }
 
     fn from_object(mut object: Map<String, Value>) -> Result<Self, AskError> {
+        // These fields are removed from the object, since the request itself denies unknown fields.
         let mut number = |name, highest| {
             let number = object.remove(name).and_then(|value| value.as_u64()).filter(|number| *number <= highest);
             number.ok_or(AskError::Missing(name))
@@ -187,7 +186,7 @@ impl Asked {
     }
 }
 
-/// Every ask by name.
+/// Names of all requests.
 pub const NAMES: &[&str] = &[
     "guided",
     "sticks",
@@ -228,8 +227,8 @@ impl Ask {
         }
     }
 
-    /// Is it done whatever its age? What ends a flight or stops a motor is; everything else is not,
-    /// when it was held up on its way.
+    /// True for requests that are carried out regardless of their age: those that end a flight or
+    /// stop a motor.
     #[must_use]
     pub const fn is_never_late(&self) -> bool {
         matches!(
@@ -240,15 +239,15 @@ impl Ask {
         )
     }
 
-    /// Is it said again and again, and not answered?
+    /// True for requests that are sent repeatedly and not answered.
     #[must_use]
     pub const fn is_repeated(&self) -> bool {
         matches!(self, Self::Sticks(_) | Self::Alive {})
     }
 
-    /// Is every number in its range, and every text printable and short?
+    /// Checks ranges of values, and length and characters of texts.
     fn check(&self) -> Result<(), AskError> {
-        // Not `!(a..b)`: what is no number is in no range.
+        // Not `!(a..b)`: NaN must be outside every range.
         let within = |name, value: f32, low: f32, high: f32| {
             (low..=high).contains(&value).then_some(()).ok_or(AskError::OutOfRange(name))
         };

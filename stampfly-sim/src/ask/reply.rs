@@ -1,24 +1,24 @@
-//! What a vehicle, or the server, answers to an ask.
+//! Answers to requests.
 
 use super::Asked;
 use serde_json::json;
 
-/// What a vehicle answers.
+/// Successful answer of a vehicle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reply {
-    /// For people.
+    /// Text for display.
     pub text: String,
-    /// The number that was asked for.
+    /// Value of the requested parameter.
     pub value: Option<f64>,
 }
 
 impl Reply {
-    /// Only words.
+    /// An answer with text only.
     pub fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), value: None }
     }
 
-    /// A number.
+    /// An answer with a value.
     #[must_use]
     pub fn value(value: f64) -> Self {
         Self { text: value.to_string(), value: Some(value) }
@@ -26,14 +26,15 @@ impl Reply {
 }
 
 impl Asked {
-    /// The text that answers it: `{"reply":{"vehicle":0,"id":17,"ok":true,"text":"armed","value":null}}`.
+    /// The JSON answer to this request:
+    /// `{"reply":{"vehicle":0,"id":17,"ok":true,"text":"armed","value":null}}`.
     #[must_use]
     pub fn answered(&self, answer: Result<Reply, String>) -> String {
         reply_text(Some(self.vehicle), self.id, answer)
     }
 }
 
-/// The text that answers what came with this id. Without a vehicle, the server answers.
+/// The JSON answer to the request with this id; `None` for an answer of the server itself.
 #[must_use]
 pub fn reply_text(vehicle: Option<usize>, id: u32, answer: Result<Reply, String>) -> String {
     let (ok, Reply { text, value }) = match answer {

@@ -1,4 +1,4 @@
-//! The magnetometer BMM150: Bosch BST-BMM150-DS001 ("DS" below).
+//! Emulator of the magnetometer BMM150: Bosch BST-BMM150-DS001 ("DS" below), on I²C or SPI.
 //!
 //! | register | content | DS |
 //! |---|---|---|
@@ -11,23 +11,27 @@
 //! | 0x51, 0x52 | repetitions: xy 1 + 2n, z 1 + n | 5.3.6 |
 //! | 0x5D–0x71 | trim | Bosch's BMM150 Sensor API (BSD-3-Clause), not in the data sheet |
 //!
-//! After power-on the chip is in suspend, where only 0x4B can be reached; it takes 3 ms to wake (DS 1.1, 4.2). One
-//! conversion takes 145 µs per xy repetition, 500 µs per z repetition and 980 µs (DS 4.2.4). Data ready is cleared by
-//! reading data (DS 4.4); a read that begins in the data sees one conversion (DS 4.4).
+//! After power-on the chip is in suspend, in which only 0x4B is accessible; waking takes 3 ms (DS
+//! 1.1, 4.2). One conversion takes 145 µs per xy repetition, 500 µs per z repetition and 980 µs (DS
+//! 4.2.4). Reading data clears data ready (DS 4.4); a read that begins in the data registers
+//! returns one conversion (DS 4.4).
 //!
-//! On SPI bit 7 of the address says read, and data follow at once; a write is one register and one value. With bit 2 of 0x4B, which can be set
-//! once the power is on, SPI has three wires and SDO is silent (DS, "Serial peripheral interface"). The pin PS, not the traffic, chooses the
+//! On SPI, bit 7 of the address marks a read, and data follow immediately; a write is one register
+//! and one value. With bit 2 of 0x4B, which can be set while the power is on, SPI has three wires
+//! and SDO is silent (DS, "Serial peripheral interface"). The pin PS, not the traffic, selects the
 //! kind of bus.
 //!
-//! The values are made by solving the public compensation formula of the Sensor API for the raw count.
+//! Raw counts are obtained by inverting the public compensation formula of the Sensor API.
 //!
-//! The self test (DS 4.7) runs in sleep mode when its bit is set, and clears it; the current of the advanced one moves z
-//! by 180 to 240 µT between its two directions, as Bosch's Sensor API checks.
+//! The self-test (DS 4.7) runs in sleep mode when its bit is set, and clears the bit. The current
+//! of the advanced self-test changes z by 180 to 240 µT between its two directions, as Bosch's
+//! Sensor API checks.
 //!
-//! *Unverified*: a self test of a millisecond (the Sensor API waits two), that it is not begun in another mode, and that
-//! its marks are zero before and stay until the next; 210 µT between the two currents; the old value of an axis that is
-//! not measured; that other registers read zero in suspend and while waking; writing as pairs of register and value;
-//! noise that does not depend on the repetitions; a Hall resistance that hardly changes; that a line that nobody drives reads as ones. Not modelled: interrupts,
+//! *Unverified*: a self-test lasts 1 ms (the Sensor API waits two), does not start in another mode,
+//! and its result bits are zero before and persist until the next; 210 µT between the two currents;
+//! an axis that is not measured keeps its value; other registers read zero in suspend and while
+//! waking; writes are pairs of register and value; noise is independent of the repetitions; the
+//! Hall resistance is nearly constant; an undriven line reads as ones. Not modelled: interrupts,
 //! thresholds.
 
 use super::{Chip, Flaw, I2cChip, SpiChip};
@@ -46,18 +50,18 @@ const AXES: u16 = 0x4E;
 const REPETITIONS_XY: u16 = 0x51;
 const REPETITIONS_Z: u16 = 0x52;
 const TRIM: u16 = 0x5D;
-/// Suspend to sleep (DS 1.1).
+/// Time from suspend to sleep (DS 1.1).
 const WAKE: Duration = Duration::from_micros(3_000);
 /// Duration of the self test.
 const SELF_TEST: Duration = Duration::from_micros(1_000);
-/// Field of the advanced self test's current, µT.
+/// Field of the advanced self-test's current, µT.
 const SELF_TEST_FIELD: f64 = 105.0;
 /// Conversions per second in normal mode (DS 5.3.4).
 const RATES: [f64; 8] = [10.0, 2.0, 6.0, 8.0, 15.0, 20.0, 25.0, 30.0];
 /// Registers 0x4C to 0x52 after reset (DS 5.2).
 const SETTINGS: [u8; 7] = [0x06, 0x3F, 0x07, 0, 0, 0, 0];
 
-/// Trim of this specimen, of usual size but all different.
+/// Trim of this specimen: typical magnitudes, all different.
 const X1: i8 = 2;
 const Y1: i8 = -3;
 const X2: i8 = 26;
@@ -72,7 +76,7 @@ const XYZ1: u16 = 6_806;
 /// Nominal Hall resistance.
 const HALL: f64 = 6_850.0;
 
-/// The bytes from 0x5D to 0x71.
+/// Registers 0x5D to 0x71.
 fn trim() -> [u8; 21] {
     let mut bytes = [0; 21];
     let mut put = |register: u16, value: &[u8]| {
@@ -90,7 +94,7 @@ fn trim() -> [u8; 21] {
     bytes
 }
 
-/// The raw counts for a field in µT, chip axes, at a Hall resistance.
+/// Raw counts for a field, µT, chip axes, at a Hall resistance.
 fn counts(field: [f64; 3], hall: f64) -> [i16; 3] {
     let turn = f64::from(XYZ1) * 16_384.0 / hall - 16_384.0;
     let gain = f64::from(XY2) * turn * turn / 268_435_456.0 + turn * f64::from(XY1) / 16_384.0 + 256.0;
@@ -101,12 +105,12 @@ fn counts(field: [f64; 3], hall: f64) -> [i16; 3] {
         + f64::from(Z3) * (hall - f64::from(XYZ1)))
         / 131_072.0
         + f64::from(Z4);
-    // Beyond the range the chip gives its lowest value as a mark of overflow.
+    // The chip marks an overflow with its lowest value.
     let limit = |value: f64, bound: f64| if value.abs() < bound { value.round() as i16 } else { -bound as i16 };
     [limit(flat(field[0], X1, X2), 4_096.0), limit(flat(field[1], Y1, Y2), 4_096.0), limit(upright, 16_384.0)]
 }
 
-/// The emulator. The same seed is the same specimen as [`MagModel`](crate::sensors::MagModel).
+/// The emulator. The same seed gives the same specimen as [`MagModel`](crate::sensors::MagModel).
 ///
 /// ```
 /// use embedded_hal::i2c::I2c;
@@ -132,7 +136,7 @@ pub struct Bmm150 {
     /// True time per time of the chip's clock.
     pace: f64,
     id: u8,
-    /// When the chip is awake; none in suspend.
+    /// Instant from which the chip is awake; `None` in suspend.
     awake: Option<Instant>,
     /// Registers 0x4C to 0x52.
     settings: [u8; 7],
@@ -141,27 +145,27 @@ pub struct Bmm150 {
     data: [u8; 8],
     /// End of the running self test.
     self_test: Option<Instant>,
-    /// The sensing elements feel nothing.
+    /// The sensing elements are broken.
     broken: bool,
     flaw: Option<Flaw>,
-    /// What a running read sees.
+    /// Copy of the data for the present read.
     shadow: [u8; 8],
     pointer: u16,
     /// First byte of a transfer on SPI.
     command: u8,
-    /// SPI of three wires.
+    /// Three-wire SPI.
     three_wires: bool,
 }
 
 impl Bmm150 {
-    /// A chip that has just been powered.
+    /// A chip after power-on.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
         let mut noise = Noise::stream(seed, Stream::Mag);
         let pace = Schedule::new(clock.now(), RATE, 0.02, &mut noise).period() * RATE * 1e-6;
         Self {
             physics: MagPhysics::new(world, noise, seed),
-            // The Hall resistance has a stream of its own: the field is to be the model's.
+            // A separate stream, so that the field has the same noise as the model's.
             noise: Noise::new(seed, 103),
             pace,
             id: 0x32,
@@ -222,7 +226,7 @@ impl Bmm150 {
                 let period = Duration::from_micros((1e6 / rate * self.pace) as u64);
                 self.until = Some(until + period.max(self.conversion_time()));
             } else {
-                // A forced conversion ends in sleep (DS 4.2.4).
+                // A forced conversion ends in sleep mode (DS 4.2.4).
                 self.settings[0] |= 0x06;
                 self.until = None;
             }
@@ -237,7 +241,7 @@ impl Bmm150 {
         }
         let [ahead, right, down] = Flaw::turn(self.flaw, body.into());
         let hall = (HALL + self.noise.normal()).round();
-        // Body is (−y, x, z) of the chip as it is soldered.
+        // The chip is mounted such that body is (−y, x, z) of the chip.
         let current = match self.setting(MODE) >> 6 {
             3 => SELF_TEST_FIELD,
             2 => -SELF_TEST_FIELD,
@@ -251,6 +255,7 @@ impl Bmm150 {
         for ((pair, word), _) in
             self.data.chunks_exact_mut(2).zip(words).zip(measured).filter(|(_, measured)| *measured)
         {
+            // Bit 0 holds the result of the last self-test and is kept.
             let passed = u16::from(pair[0] & 1);
             pair.copy_from_slice(&(word | passed).to_le_bytes());
         }
@@ -279,7 +284,7 @@ impl Chip for Bmm150 {
         self.update(now);
         match register {
             POWER if value & 0x82 == 0x82 && self.is_awake(now) => {
-                // Soft reset keeps the power bit and ends in sleep (DS 5.3.4).
+                // A soft reset keeps the power bit and ends in sleep mode (DS 5.3.4).
                 self.reset(now);
                 self.awake = Some(now + WAKE);
             }

@@ -1,4 +1,4 @@
-//! The barometer BMP280: Bosch BST-BMP280-DS001 ("DS" below).
+//! Emulator of the barometer BMP280: Bosch BST-BMP280-DS001 ("DS" below), on I²C or SPI.
 //!
 //! | register | content | DS |
 //! |---|---|---|
@@ -10,16 +10,19 @@
 //! | 0xF5 | standby (7:5), filter (4:2) | 4.3.5 |
 //! | 0xF7–0xFC | pressure, temperature, 20 bits each, high byte first | 4.3.6, 4.3.7 |
 //!
-//! Reads go on to the next register; writes are pairs of register and value (DS 5.2.1, 5.2.2). So it is on SPI, where bit 7 of the address says
-//! read and data follow at once (DS 5.3); a one in bit 0 of 0xF5 makes it SPI of three wires, whose SDO is silent (DS 4.3.5, 5.3). A read that begins in
-//! the data registers sees one conversion, whatever ends meanwhile (DS 3.10). A mode written during a conversion acts
-//! at its end (DS 3.6). A write to 0xF5 in normal mode is ignored, which the data sheet only says may happen (4.3.5).
+//! Reads continue with the next register; writes are pairs of register and value (DS 5.2.1, 5.2.2).
+//! The same holds on SPI, where bit 7 of the address marks a read and data follow immediately (DS
+//! 5.3); bit 0 of 0xF5 selects three-wire SPI, whose SDO is silent (DS 4.3.5, 5.3). A read that
+//! begins in the data registers returns one conversion, even if another ends meanwhile (DS 3.10). A
+//! mode written during a conversion takes effect at its end (DS 3.6). A write to 0xF5 in normal
+//! mode is ignored; the data sheet says that this may happen (4.3.5).
 //!
-//! *Unverified*: that the chip acknowledges, ignores writes and shows a zero calibration in the two milliseconds of
-//! its start-up (DS table 2 gives only the time); the noise per oversampling, which is scaled from this project's
-//! static records at ×4 and filter 4 by the root of the number of samples; that a dead sensing element leaves the data
-//! registers at their reset value, while conversions go on; that a line that nobody drives reads as ones. Not modelled: that I2C is deaf after
-//! the first low CSB (DS 5.1); here a chip is soldered to one kind of bus.
+//! *Unverified*: in the 2 ms of its start-up the chip acknowledges, ignores writes and shows a zero
+//! calibration (DS table 2 gives only the time); the noise per oversampling, which is scaled from
+//! this project's static records at ×4 and filter 4 by the square root of the number of samples;
+//! with a broken sensing element the data registers keep their reset value while conversions
+//! continue; an undriven line reads as ones. Not modelled: I²C is disabled after the first low CSB
+//! (DS 5.1); here a chip is attached to one kind of bus.
 
 use super::{Chip, Flaw, I2cChip, SpiChip};
 use crate::noise::{Noise, Stream};
@@ -39,15 +42,16 @@ const DATA: u16 = 0xF7;
 const RESET_WORD: u16 = 0xB6;
 /// Start-up time (DS table 2).
 const START_UP: Duration = Duration::from_micros(2_000);
-/// What the data registers hold before the first conversion, and for a quantity that is not measured (DS 4.2, 3.3.1).
+/// Content of the data registers before the first conversion, and for a quantity that is not
+/// measured (DS 4.2, 3.3.1).
 const SKIPPED: u32 = 0x80000;
 /// Standby times of normal mode, µs (DS table 11).
 const STANDBY: [u64; 8] = [500, 62_500, 125_000, 250_000, 500_000, 1_000_000, 2_000_000, 4_000_000];
 
-/// The calibration words in the order of their registers: T1, T2, T3, P1 to P9. The example of DS 3.12.
+/// Calibration words in the order of their registers: T1, T2, T3, P1 to P9. The example of DS 3.12.
 const WORDS: [i32; 12] = [27_504, 26_435, -1_000, 36_477, -10_685, 3_024, 2_855, 140, -7, 15_500, -14_600, 6_000];
 
-/// Fine temperature, 5120 per °C, from the converter's value (DS 8.1).
+/// Fine temperature, 5120 per °C, from the raw value (DS 8.1).
 fn fine_temperature(adc: f64) -> f64 {
     let word = |n: usize| f64::from(WORDS[n]);
     let first = (adc / 16_384.0 - word(0) / 1_024.0) * word(1);
@@ -55,7 +59,7 @@ fn fine_temperature(adc: f64) -> f64 {
     first + second * second * word(2)
 }
 
-/// Pressure, Pa, from the converter's value (DS 8.1).
+/// Pressure, Pa, from the raw value (DS 8.1).
 fn pressure(adc: f64, fine: f64) -> f64 {
     let p = |n: usize| f64::from(WORDS[n + 2]);
     let x = fine / 2.0 - 64_000.0;
@@ -65,7 +69,8 @@ fn pressure(adc: f64, fine: f64) -> f64 {
     y + (p(9) * y * y / 2_147_483_648.0 + y * p(8) / 32_768.0 + p(7)) / 16.0
 }
 
-/// The 20-bit value whose `rising` function comes nearest to zero from below.
+/// The largest 20-bit value at which the increasing function `rising` is at most zero, by
+/// bisection.
 fn invert(rising: impl Fn(f64) -> f64) -> u32 {
     (0..20).rev().fold(0, |value, bit| {
         let with = value | 1 << bit;
@@ -80,7 +85,7 @@ enum Phase {
     Standby { until: Instant },
 }
 
-/// The emulator. The same seed is the same specimen as [`BaroModel`](crate::sensors::BaroModel).
+/// The emulator. The same seed gives the same specimen as [`BaroModel`](crate::sensors::BaroModel).
 ///
 /// ```
 /// use embedded_hal::i2c::I2c;
@@ -111,17 +116,17 @@ pub struct Bmp280 {
     phase: Phase,
     control: u8,
     config: u8,
-    /// A mode written during a conversion.
+    /// Mode written during a conversion.
     pending: Option<u8>,
-    /// The sensing element feels nothing.
+    /// The sensing element is broken.
     broken: bool,
     flaw: Option<Flaw>,
     last_conversion: Instant,
-    /// Pressure and temperature as the converter gives them.
+    /// Raw pressure and temperature.
     data: [u32; 2],
-    /// What a running read sees.
+    /// Copy of the data for the present read.
     shadow: [u32; 2],
-    /// Memory of the filter: none before the first conversion.
+    /// State of the filter; `None` before the first conversion.
     filtered: Option<[f64; 2]>,
     pointer: u16,
     /// First byte of a transfer on SPI.
@@ -129,7 +134,7 @@ pub struct Bmp280 {
 }
 
 impl Bmp280 {
-    /// A chip that has just been powered.
+    /// A chip after power-on.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
         let mut noise = Noise::stream(seed, Stream::Baro);
@@ -167,13 +172,15 @@ impl Bmp280 {
         Duration::from_micros((microseconds as f64 * self.pace) as u64)
     }
 
-    /// Typical conversion time: 1 ms, 2 ms per sample, and 0.5 ms when pressure is measured (DS table 13).
+    /// Typical conversion time: 1 ms, 2 ms per sample, and 0.5 ms when pressure is measured (DS
+    /// table 13).
     fn conversion_time(&self) -> Duration {
         let [pressure, temperature] = self.oversampling();
         self.true_time(1_000 + 2_000 * (pressure + temperature) + if pressure > 0 { 500 } else { 0 })
     }
 
-    /// Sleeps or begins to convert, as the mode bits say: 0 sleep, 1 and 2 forced, 3 normal (DS table 10).
+    /// Enters sleep or starts a conversion according to the mode bits: 0 sleep, 1 and 2 forced, 3
+    /// normal (DS table 10).
     fn enter_mode(&mut self, now: Instant) {
         self.phase = match self.control & 3 {
             0 => Phase::Sleep,
@@ -185,14 +192,17 @@ impl Bmp280 {
         let [samples, temperature_samples] = self.oversampling();
         let period = f64::from(at.since(self.last_conversion).seconds());
         self.last_conversion = at;
-        // A filter of coefficient c divides the variance of white noise by 2c − 1.
+        // `DEVIATION` is after a filter of coefficient 4 at ×4; a filter of coefficient c divides
+        // the variance of white noise by 2c − 1.
         let deviation = DEVIATION * (7.0 * 4.0 / samples.max(1) as f64).sqrt();
         let (true_pressure, celsius) =
             (self.physics.pressure(at, period, deviation), f64::from(self.physics.temperature(at)));
+        // Temperature first: the pressure compensation needs the fine temperature.
         let temperature = invert(|adc| fine_temperature(adc) - 5_120.0 * celsius);
         let fine = fine_temperature(f64::from(temperature));
         let fresh = [invert(|adc| true_pressure - pressure(adc, fine)), temperature];
         let coefficient = f64::from(1u8 << (self.config >> 2 & 7).min(4));
+        // The first conversion initialises the filter.
         let before = self.filtered.unwrap_or(fresh.map(f64::from));
         let filtered: [f64; 2] =
             core::array::from_fn(|i| (before[i] * (coefficient - 1.0) + f64::from(fresh[i])) / coefficient);
@@ -222,7 +232,7 @@ impl Bmp280 {
                         let standby = STANDBY[usize::from(self.config >> 5)];
                         self.phase = Phase::Standby { until: until + self.true_time(standby) };
                     } else {
-                        // After a forced conversion the mode bits are sleep again (DS 3.6.2).
+                        // A forced conversion resets the mode bits to sleep (DS 3.6.2).
                         self.control &= !3;
                         self.phase = Phase::Sleep;
                     }
@@ -270,7 +280,7 @@ impl Chip for Bmp280 {
                 self.control = value as u8;
                 self.enter_mode(now);
             }
-            // Bit 1 does not exist. Bit 0 is the number of wires.
+            // Bit 1 does not exist; bit 0 selects three-wire SPI.
             CONFIG if self.control & 3 != 3 => self.config = value as u8 & !2,
             _ => {}
         }
@@ -341,7 +351,7 @@ impl SpiChip for Bmp280 {
             self.command = byte;
             self.pointer = 0x80 | u16::from(byte);
         } else if self.command & 0x80 == 0 {
-            // Another address, or its value: the same as on I2C, but for bit 7.
+            // Another address or its value: as on I²C, except for bit 7 of addresses.
             self.receive(index, if index.is_multiple_of(2) { byte | 0x80 } else { byte }, now);
         }
     }

@@ -1,4 +1,4 @@
-//! All chips of the StampFly, wired: two buses and the pins beside them.
+//! The StampFly's chips on their two buses with their pins.
 
 use super::{
     Attached, Bmi270, Bmm150, Bmp280, Controller, I2cBus, Ina3221, Pmw3901, ShutdownPin, SpiBus, SpiPort, Vl53l3cx,
@@ -9,7 +9,7 @@ use crate::time::Clock;
 use crate::world::World;
 use embedded_hal::spi::{MODE_3, Mode};
 
-/// How a processor drives the two chips on SPI.
+/// SPI configuration of the processor.
 ///
 /// ```
 /// use embedded_hal::spi::{MODE_0, Operation, SpiDevice};
@@ -31,18 +31,19 @@ use embedded_hal::spi::{MODE_3, Mode};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpiSetup {
-    /// When it sets the level at which the clock idles.
+    /// When the controller sets the clock's idle level.
     pub controller: Controller,
-    /// The inertial sensor's mode and clock, Hz.
+    /// Mode and clock of the inertial sensor, Hz.
     pub imu: (Mode, u32),
-    /// The flow sensor's.
+    /// Mode and clock of the flow sensor, Hz.
     pub flow: (Mode, u32),
-    /// Sends a byte to nobody in the inertial sensor's mode, before the first transfer.
+    /// Before the first transfer, send a byte in the inertial sensor's mode without a selected
+    /// chip, which sets the clock's idle level.
     pub begins_with_nobody: bool,
 }
 
 impl Default for SpiSetup {
-    /// The StampFly's firmware: an ESP32-S3, both chips in mode 3, each with the fastest clock that it allows.
+    /// As the StampFly's firmware: an ESP32-S3, both chips in mode 3, each with its highest clock.
     fn default() -> Self {
         Self {
             controller: Controller::LevelWithTransfer,
@@ -53,8 +54,8 @@ impl Default for SpiSetup {
     }
 }
 
-/// The chips of one vehicle, just powered, with both chip selects of the SPI driven high. The same configuration is the
-/// same specimens as [`Sensors`](crate::sensors::Sensors).
+/// The chips of one vehicle after power-on, with both SPI chip selects high. The same configuration
+/// gives the same specimens as [`Sensors`](crate::sensors::Sensors).
 ///
 /// ```
 /// use stampfly_drivers::chip::ina3221::{Config, Ina3221};
@@ -74,19 +75,19 @@ impl Default for SpiSetup {
 pub struct Board {
     /// Magnetometer, barometer, battery monitor and both range finders.
     pub i2c: I2cBus,
-    /// The inertial sensor on the SPI it shares with the flow sensor.
+    /// The inertial sensor, on the SPI shared with the flow sensor.
     pub imu: SpiPort<Bmi270>,
-    /// The flow sensor.
+    /// The flow sensor, on the same SPI.
     pub flow: SpiPort<Pmw3901>,
-    /// XSHUT of the range finder that looks down.
+    /// XSHUT of the bottom range finder.
     pub shutdown_bottom: ShutdownPin,
-    /// XSHUT of the range finder that looks ahead.
+    /// XSHUT of the front range finder.
     pub shutdown_front: ShutdownPin,
-    /// What may happen to each chip.
+    /// Handles for faults of each chip.
     pub attached: AttachedChips,
 }
 
-/// The chips by name, for faults.
+/// Fault handles of all chips.
 #[derive(Clone, Debug)]
 pub struct AttachedChips {
     /// BMI270.
@@ -99,14 +100,14 @@ pub struct AttachedChips {
     pub baro: Attached,
     /// INA3221.
     pub power: Attached,
-    /// VL53L3CX that looks down.
+    /// Bottom VL53L3CX.
     pub tof: Attached,
-    /// VL53L3CX that looks ahead.
+    /// Front VL53L3CX.
     pub tof_front: Attached,
 }
 
 impl AttachedChips {
-    /// Each with the name of what it measures, those on SPI first.
+    /// All chips with the names of their quantities, those on SPI first.
     #[must_use]
     pub const fn all(&self) -> [(&'static str, &Attached); 7] {
         let Self { imu, flow, mag, baro, power, tof, tof_front } = self;
@@ -121,7 +122,7 @@ impl AttachedChips {
         ]
     }
 
-    /// The chip that measures this.
+    /// The chip with this name.
     #[must_use]
     pub fn named(&self, name: &str) -> Option<&Attached> {
         self.all().into_iter().find_map(|(known, chip)| (known == name).then_some(chip))
@@ -129,16 +130,16 @@ impl AttachedChips {
 }
 
 impl Board {
-    /// Both range finders' address after power-on.
+    /// Address of both range finders after power-on.
     const RANGE: u8 = 0x29;
 
-    /// Chips around this world. `image` is what the inertial sensor takes for its configuration file.
+    /// Chips in this world. `image` is the configuration file that the inertial sensor accepts.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, config: &SimulationConfig, image: &[u8]) -> Self {
         Self::on(&SpiSetup::default(), world, clock, config, image)
     }
 
-    /// The same with another set-up of the SPI.
+    /// As [`new`](Self::new), with another SPI configuration.
     #[must_use]
     pub fn on(setup: &SpiSetup, world: &World, clock: &Clock, config: &SimulationConfig, image: &[u8]) -> Self {
         let seed = config.seed;
@@ -165,8 +166,8 @@ impl Board {
     }
 }
 
-/// A stand-in for the inertial sensor's configuration file, which is its maker's: 8 kB in which no two bursts are equal.
-/// The emulator only compares.
+/// A placeholder for the inertial sensor's proprietary configuration file: 8 kB in which no two
+/// bursts are equal. The emulator only compares the bytes.
 #[must_use]
 pub fn stand_in_image() -> Vec<u8> {
     (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()

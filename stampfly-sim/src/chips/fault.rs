@@ -1,4 +1,4 @@
-//! What may go wrong between a chip and the processor, switched on and off while the simulation runs.
+//! Faults between chip and processor, and flaws of a chip, changeable at run time.
 
 use crate::chips::Chip;
 use crate::noise::Noise;
@@ -7,68 +7,69 @@ use core::cell::{Cell, RefCell};
 use stampfly_types::Duration;
 use std::rc::Rc;
 
-/// The faults of one chip. The default is none.
+/// Bus faults of one chip. None by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// The chip answers nothing: no acknowledge on I²C, all ones on SPI.
+    /// The chip does not answer: no acknowledge on I²C, all ones on SPI.
     pub dead: bool,
-    /// Share of transfers that fail, 0 to 1: no acknowledge on I²C, an overrun of the controller on SPI.
+    /// Share of transfers that fail, 0 to 1: no acknowledge on I²C, controller overrun on SPI.
     pub refusals: f64,
-    /// Probability that a data bit is read or written wrongly, 0 to 1.
+    /// Probability of a wrong data bit when reading or writing, 0 to 1.
     pub bit_errors: f64,
-    /// How long the chip holds the clock line low in every transfer. I²C only.
+    /// Time for which the chip holds the clock line low in every transfer. I²C only.
     pub stretch: Duration,
 }
 
-/// What is wrong with how a chip was soldered or made, or with what is in front of it: it answers and measures, but not what
-/// its driver takes it for. Each emulator knows those that can happen to its part and takes no notice of the others.
+/// A defect in mounting or manufacture, or an obstacle in front of the sensor: the chip answers and
+/// measures, but not what its driver expects. Each emulator implements the flaws of its part and
+/// ignores the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Flaw {
-    /// Soldered otherwise, or another variant of the part: where each axis that it reports points, as rows of the body's
-    /// axes where the board's layout has the identity. BMI270, BMM150, MPU-6000, PMW3901.
+    /// Other mounting or another variant of the part: the direction of each reported axis, as rows
+    /// of the body's axes; the identity is the board's layout. BMI270, BMM150, MPU-6000, PMW3901.
     Mounting([[i8; 3]; 3]),
-    /// Its conversions repeat the last. BMP280, BMM150, MPU-6000.
+    /// Conversions repeat the last value. BMP280, BMM150, MPU-6000.
     Stuck,
-    /// It stays asleep at so many requests to wake after a reset. MPU-6000.
+    /// Ignores this number of wake-up requests after a reset. MPU-6000.
     Sleepy(u32),
-    /// It measures longer by this, m: a cover glass, a sensor that was pressed in. VL53L3CX.
+    /// Measures too long by this, m: a cover glass, a recessed sensor. VL53L3CX.
     Offset(f64),
-    /// Something lies this far in front of it, m. VL53L3CX.
+    /// An object at this distance covers it, m. VL53L3CX.
     Covered(f64),
-    /// What it computes by itself is nonsense; its histograms are not. VL53L3CX.
+    /// Its own distances are invalid, its histograms are valid. VL53L3CX.
     LightMode(Nonsense),
-    /// It sees so many times the voltage, as behind another divider. INA3221.
+    /// Factor on the measured voltage, as with another divider. INA3221.
     Voltage(f64),
-    /// It sees so many times the current, as across another shunt. INA3221.
+    /// Factor on the measured current, as with another shunt. INA3221.
     Current(f64),
 }
 
-/// What a range finder says that cannot measure in the way it is driven.
+/// Failure of a range finder whose ranging mode does not work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Nonsense {
-    /// Its interrupt never comes.
+    /// No interrupt comes.
     Silent,
-    /// No measurement succeeds: there is no bias voltage for the detector.
+    /// Every measurement fails: the detector has no bias voltage.
     Failing,
-    /// The same distance, to the last bit.
+    /// The same distance every time.
     Frozen,
-    /// Light comes back, but the distance is never certain enough.
+    /// Signal is received, but every distance has too large a standard deviation.
     Unseen,
-    /// No light comes back.
+    /// No signal is received.
     Blind,
 }
 
 impl Flaw {
-    /// A vector of the body as a chip with this flaw is exposed to it.
+    /// A vector of the body in the axes of a chip with this flaw.
     pub(super) fn turn(flaw: Option<Self>, body: [f64; 3]) -> [f64; 3] {
         let Some(Self::Mounting(rows)) = flaw else { return body };
         rows.map(|row| row.iter().zip(body).map(|(factor, part)| f64::from(*factor) * part).sum())
     }
 }
 
-/// A handle to a chip on a bus: its faults, and what somebody else may do to it. Clones mean the same chip.
+/// A handle to a chip on a bus, for faults and flaws. Clones refer to the same chip.
 ///
 /// ```
 /// use embedded_hal_async::i2c::I2c;
@@ -98,7 +99,7 @@ impl Attached {
         Self { clock: clock.clone(), chip, faults: Rc::default() }
     }
 
-    /// The faults at present.
+    /// The present faults.
     #[must_use]
     pub fn faults(&self) -> Faults {
         self.faults.get()
@@ -109,34 +110,34 @@ impl Attached {
         self.faults.set(faults);
     }
 
-    /// What a register holds now, without the bus but with whatever reading does to the chip.
+    /// Reads a register without the bus, with the side effects of reading.
     #[must_use]
     pub fn peek(&self, register: u16) -> u16 {
         self.chip.borrow_mut().read(register, self.clock.now())
     }
 
-    /// The supply dips: the chip loses its settings and starts again.
+    /// Resets the chip as a dip of its supply does: it loses its settings.
     pub fn reset(&self) {
         self.chip.borrow_mut().reset(self.clock.now());
     }
 
-    /// Breaks or mends the sensing element: see [`Chip::set_broken`].
+    /// Breaks or repairs the sensing element, see [`Chip::set_broken`].
     pub fn set_broken(&self, broken: bool) {
         self.chip.borrow_mut().set_broken(broken);
     }
 
-    /// Gives the chip a flaw, or mends it: see [`Flaw`].
+    /// Sets or removes a flaw, see [`Flaw`].
     pub fn set_flaw(&self, flaw: Option<Flaw>) {
         self.chip.borrow_mut().set_flaw(flaw);
     }
 
-    /// Another part has been soldered: this is what its identity register says from now on.
+    /// Replaces the content of the identity register, as of another part.
     pub fn set_id(&self, id: u16) {
         self.chip.borrow_mut().set_id(id);
     }
 }
 
-/// A byte as it arrives at the other end of the line.
+/// Transmits a byte with random bit errors.
 pub(super) fn carry(byte: u8, bit_errors: f64, noise: &mut Noise) -> u8 {
     if bit_errors <= 0.0 {
         return byte;

@@ -1,8 +1,9 @@
-//! An I²C bus on virtual time, with the `async` and the blocking traits of embedded-hal.
+//! I²C bus on virtual time, with the `async` and the blocking traits of embedded-hal.
 //!
-//! The whole transfer costs its bits at 400 kHz and no other task gets the bus meanwhile. The chips see each byte at
-//! the instant of its last bit, but only when the transfer is over: nothing is asked of the world's future. A future
-//! that is dropped before its end has done nothing but to occupy the line.
+//! A transfer occupies the bus for its bits at 400 kHz. The chips process each byte at the instant
+//! of its last bit, but only when the transfer is complete, so that the world is never advanced
+//! beyond the clock. A future dropped before completion has transferred nothing, but the bus stays
+//! busy for the planned time.
 
 use super::fault::{Attached, Faults, carry};
 use super::latency::Latency;
@@ -14,17 +15,18 @@ use embedded_hal::i2c::{ErrorType, NoAcknowledgeSource, Operation};
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// Nanoseconds per bit at 400 kHz, the fast mode of the I²C specification (UM10204, table 10).
+/// Time of a bit at 400 kHz, ns: fast mode of the I²C specification (UM10204, table 10).
 const BIT: u64 = 2_500;
-/// Bits of a byte with its acknowledge.
+/// Bits per byte including its acknowledge.
 const BYTE: u64 = 9;
-/// Clock pulses after which a chip in the middle of a byte has let go of the data line (UM10204, section 3.1.16).
+/// Clock pulses after which a chip interrupted within a byte has released the data line (UM10204,
+/// section 3.1.16).
 const RECOVERY: u8 = 9;
-/// Stream of the bit errors; no sensor has this number.
+/// Random stream of bit errors; no sensor uses this number.
 const STREAM: u64 = 101;
 
 struct Device {
-    /// The address it was soldered to.
+    /// The address to which it was soldered.
     soldered: u8,
     chip: Rc<RefCell<dyn I2cChip>>,
     attached: Attached,
@@ -40,17 +42,17 @@ struct State {
     clock: Clock,
     devices: RefCell<Vec<Device>>,
     busy_until: Rc<Cell<Instant>>,
-    /// Clock pulses until the data line is free.
+    /// Clock pulses until the data line is released.
     held: Cell<u8>,
     /// The data line is shorted to ground.
     shorted: Cell<bool>,
     noise: RefCell<Noise>,
-    /// Every operation begins with a start.
+    /// Every operation begins with a start condition.
     restarts: Cell<bool>,
     latency: Cell<Latency>,
 }
 
-/// A handle to the bus. Clones are the same bus; each may belong to another driver.
+/// A handle to the bus. Clones are the same bus; each driver can own one.
 ///
 /// ```
 /// use stampfly_sim::chips::{Bmp280, I2cBus};
@@ -78,7 +80,7 @@ impl core::fmt::Debug for I2cBus {
 }
 
 impl I2cBus {
-    /// A bus without chips. The seed decides on bit errors and refusals.
+    /// A bus without chips. `seed` draws bit errors and refusals.
     #[must_use]
     pub fn new(clock: &Clock, seed: u64) -> Self {
         Self(Rc::new(State {
@@ -93,19 +95,21 @@ impl I2cBus {
         }))
     }
 
-    /// From now on a start comes before every operation, also between two of one direction, which embedded-hal asks to be joined. Linux
-    /// makes a message of each operation, and so do some other controllers' drivers.
+    /// Sends a start condition before every operation, also between two of the same direction,
+    /// which embedded-hal requires to be joined. Linux and some controllers' drivers send each
+    /// operation as a separate message.
     pub fn restart_between_operations(&self) {
         self.0.restarts.set(true);
     }
 
-    /// From now on the software takes so long: once to set a transfer up, and once to wake its task for each operation above what is polled.
+    /// Sets the software latency: once per transfer for set-up, and once per operation for waking
+    /// the task unless it is polled.
     pub fn set_latency(&self, latency: Latency) {
         self.0.latency.set(latency);
     }
 
-    /// Solders a chip to the bus at a 7-bit address. Where several have the same, all of them take what is written, and
-    /// what is read is zero wherever one of them sends a zero: the line is pulled low.
+    /// Attaches a chip at a 7-bit address. Chips with the same address all receive writes, and
+    /// reads are the AND of their bytes, because any of them pulls the line low.
     pub fn attach(&self, address: u8, mut chip: impl I2cChip + 'static) -> Attached {
         chip.wire(&self.0.busy_until);
         let chip = Rc::new(RefCell::new(chip));
@@ -114,33 +118,34 @@ impl I2cBus {
         attached
     }
 
-    /// A chip that lost count in the middle of a byte holds the data line low, until nine clock pulses.
+    /// Makes a chip hold the data line low, as after an interrupted byte, until nine clock pulses.
     pub fn hold_sda(&self) {
         self.0.held.set(RECOVERY);
     }
 
-    /// The data line is shorted to ground, which no clock pulse helps, or is not any more.
+    /// Shorts the data line to ground, or removes the short. Clock pulses do not release it.
     pub fn short_sda(&self, shorted: bool) {
         self.0.shorted.set(shorted);
     }
 
-    /// Is the data line free?
+    /// True if the data line is released.
     #[must_use]
     pub fn sda_is_high(&self) -> bool {
         self.0.held.get() == 0 && !self.0.shorted.get()
     }
 
-    /// One pulse of the clock line, made by hand. Takes no time of its own; the caller waits between edges.
+    /// One pulse of the clock line outside a transfer. Takes no time; the caller waits between
+    /// edges.
     pub fn pulse_scl(&self) {
         self.0.held.set(self.0.held.get().saturating_sub(1));
     }
 
-    /// The clock it runs on.
+    /// The bus's clock.
     pub(super) fn clock(&self) -> Clock {
         self.0.clock.clone()
     }
 
-    /// How long the chips at this address hold the clock; `None` when nobody acknowledges.
+    /// Time for which the chips at this address stretch the clock; `None` if none acknowledges.
     fn stretch(&self, address: u8) -> Option<Duration> {
         let acknowledges = |faults: &Faults| {
             let refused = faults.refusals > 0.0 && self.0.noise.borrow_mut().chance(faults.refusals);
@@ -151,13 +156,14 @@ impl I2cBus {
         answering.filter(acknowledges).map(|faults| faults.stretch).max()
     }
 
-    /// Takes the bus. Returns the start, the end, and what is already known to fail.
+    /// Occupies the bus. Returns start, end, and errors already known.
     fn begin(&self, address: u8, operations: &[Operation<'_>]) -> (Instant, Instant, Result<(), BusError>) {
         let mut latency = self.0.latency.get();
         if latency.jitter > Duration::ZERO {
             latency = latency.drawn(self.0.noise.borrow_mut().unit());
         }
         let start = self.0.clock.now() + latency.setup;
+        // Each operation that is not polled ends with an interrupt and a wake of the task.
         let woken = operations.iter().fold(Duration::ZERO, |late, operation| {
             late + latency.of_bytes(match operation {
                 Operation::Read(bytes) => bytes.len(),
@@ -165,6 +171,7 @@ impl I2cBus {
             })
         });
         let (bits, stretch, outcome) = match self.stretch(address) {
+            // The controller fails at the start condition, after one bit.
             _ if !self.sda_is_high() => (1, Duration::ZERO, Err(BusError::ArbitrationLost)),
             None => (2 + BYTE, Duration::ZERO, Err(BusError::NoAcknowledge(NoAcknowledgeSource::Address))),
             Some(stretch) => (self.length(operations), stretch, Ok(())),
@@ -174,7 +181,8 @@ impl I2cBus {
         (start, end, outcome)
     }
 
-    /// Bits of a whole transfer: a start and the address at every change of direction, or before every operation, the bytes, and the stop.
+    /// Number of bits of a transfer: a start and the address at every change of direction (or
+    /// before every operation), the bytes, and the stop.
     fn length(&self, operations: &[Operation<'_>]) -> u64 {
         let mut before = None;
         operations.iter().fold(1, |bits, operation| {

@@ -1,4 +1,5 @@
-//! The battery monitor INA3221: Texas Instruments SBOS576 revision B ("DS" below), channel 2 across the 10 mΩ shunt.
+//! Emulator of the battery monitor INA3221: Texas Instruments SBOS576 revision B ("DS" below), with
+//! channel 2 on the 10 mΩ shunt.
 //!
 //! | register | content | after reset | DS |
 //! |---|---|---|---|
@@ -11,13 +12,14 @@
 //! | 0x10, 0x11 | limits of the valid power | 0x2710, 0x2328 | 8.6.1 |
 //! | 0xFE, 0xFF | maker, part | 0x5449, 0x3220 | 8.6.1 |
 //!
-//! A write to the configuration starts a new conversion, whatever the old one was at (DS 8.6.2.1). Registers change
-//! when all averages of all enabled channels are done (DS 8.4.2.2). Conversion ready is cleared by reading 0x0F and
-//! by a write to the configuration that does not power down (DS 8.6.2.15).
+//! A write to the configuration starts a new conversion and aborts the present one (DS 8.6.2.1).
+//! Registers change when all averages of all enabled channels are done (DS 8.4.2.2). Conversion
+//! ready is cleared by reading 0x0F and by a write to the configuration that does not power down
+//! (DS 8.6.2.15).
 //!
-//! Not modelled: alerts and the sum. *Unverified*: that channels 1 and 3, which are connected to nothing, read zero;
-//! that a read goes on with the same register after two bytes; that half a word written is ignored; that a dead converter
-//! reads zero and is ready all the same.
+//! Not modelled: alerts and the sum. *Unverified*: the unconnected channels 1 and 3 read zero; a
+//! read continues with the same register after two bytes; an incomplete word is ignored when
+//! writing; a broken converter reads zero and still reports ready.
 
 use super::{Chip, Flaw, I2cChip};
 use crate::noise::{Noise, Stream};
@@ -42,10 +44,11 @@ const CHANNEL_TWO: u16 = 1 << 13;
 const AVERAGES: [u64; 8] = [1, 4, 16, 64, 128, 256, 512, 1_024];
 /// Conversion times, µs (DS tables 4 and 5).
 const TIMES: [u64; 8] = [140, 204, 332, 588, 1_100, 2_116, 4_156, 8_244];
-/// Ohms.
+/// Shunt, Ω.
 const SHUNT_RESISTANCE: f64 = 0.01;
 
-/// The emulator. The same seed is the same specimen as [`PowerModel`](crate::sensors::PowerModel).
+/// The emulator. The same seed gives the same specimen as
+/// [`PowerModel`](crate::sensors::PowerModel).
 ///
 /// ```
 /// use embedded_hal::i2c::I2c;
@@ -71,18 +74,18 @@ pub struct Ina3221 {
     pace: f64,
     part: u16,
     registers: [u16; 18],
-    /// Begin of the running conversion; none when powered down or done.
+    /// Begin of the running conversion; `None` when powered down or done.
     begun: Option<Instant>,
-    /// The converter feels nothing.
+    /// The converter is broken.
     broken: bool,
     flaw: Option<Flaw>,
     pointer: u16,
-    /// First byte of a word that is being written.
+    /// First byte of a word in transfer.
     half: u8,
 }
 
 impl Ina3221 {
-    /// A chip that has just been powered.
+    /// A chip after power-on.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
         let mut noise = Noise::stream(seed, Stream::Power);
@@ -106,12 +109,12 @@ impl Ina3221 {
         self.registers[usize::from(CONFIGURATION)]
     }
 
-    /// What the mode measures: shunt, bus (DS table 6).
+    /// Measured quantities of the mode: shunt, bus (DS table 6).
     fn measures(&self) -> [bool; 2] {
         [self.configuration() & 1 != 0, self.configuration() & 2 != 0]
     }
 
-    /// Length of a conversion of all channels with all averages, at least a microsecond.
+    /// Duration of a conversion of all channels with all averages, at least 1 µs.
     fn conversion_time(&self) -> Duration {
         let field = |shift: u32| usize::from(self.configuration() >> shift & 7);
         let [shunt, bus] = self.measures();
@@ -132,7 +135,7 @@ impl Ina3221 {
             return;
         }
         let continuous = self.configuration() & 4 != 0;
-        // Only the newest conversion is left to be seen.
+        // Earlier conversions have been overwritten, so only the newest is computed.
         let first = if continuous { begun + length * (done - 1) } else { begun };
         self.begun = continuous.then_some(first + length);
         self.registers[usize::from(MASK)] |= 1;
@@ -146,6 +149,7 @@ impl Ina3221 {
             Some(Flaw::Current(factor)) => [volts, amperes * factor],
             _ => [volts, amperes],
         };
+        // Both quantities are 13-bit signed numbers in bits 15 to 3.
         let word = |value: f64| ((value.round().clamp(-4_096.0, 4_095.0) as i16) << 3) as u16;
         let [shunt, bus] = self.measures();
         if shunt {

@@ -1,16 +1,16 @@
-//! The time that a processor takes for a transfer beyond what the wires need.
+//! Software latency of bus transfers.
 //!
-//! Without it a bus is as fast as its bits, and a deadline that leaves nothing to the software looks sufficient. Zero is the
-//! default, as for everything else that a vehicle flies on here. Use it to find out what a driver's deadlines leave; not
-//! as a model of a certain processor, whose figures nobody has measured.
+//! Without it a bus is as fast as its bits, and a deadline that leaves no time for software appears
+//! sufficient. The default is zero. Use it to find the latency that a driver's deadlines tolerate;
+//! it is not a model of a particular processor, for which no measurements exist.
 
 use stampfly_types::Duration;
 
-/// What the software of a bus takes, by cause. [`SpiBus::set_latency`](super::SpiBus::set_latency),
+/// Software latency of a bus by cause. See [`SpiBus::set_latency`](super::SpiBus::set_latency) and
 /// [`I2cBus::set_latency`](super::I2cBus::set_latency).
 ///
-/// On SPI, a transfer of which the processor does every part itself is one that its task does not give way in: other
-/// tasks wait, and no deadline can end it.
+/// On SPI, a transfer whose operations are all polled and whose pauses are all spun does not yield:
+/// other tasks wait, and a timeout cannot end it.
 ///
 /// ```
 /// use embedded_hal::spi::{Operation, SpiDevice};
@@ -30,38 +30,38 @@ use stampfly_types::Duration;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
-    /// Before the first bit of each transfer: taking the bus, setting it up.
+    /// Before the first bit of each transfer: acquiring and configuring the bus.
     pub setup: Duration,
-    /// From the end of an operation to the task that waits for its interrupt.
+    /// From the end of an operation until the task waiting for its interrupt runs.
     pub wake: Duration,
-    /// How much later than asked for a pause ends that waits for an alarm.
+    /// Delay of the end of a pause that waits for an alarm.
     pub alarm: Duration,
-    /// Operations of up to so many bytes are moved by the processor, which waits for no interrupt.
+    /// Largest length of an operation moved by polling, without an interrupt, bytes.
     pub polled: usize,
-    /// Pauses up to this are spun away and not late.
+    /// Longest pause that is spun, without an alarm.
     pub spun: Duration,
-    /// Each of the three lasts up to so much longer, at random, by the bus's seed.
+    /// Largest random addition to `setup`, `wake` and `alarm`, drawn from the bus's seed.
     pub jitter: Duration,
 }
 
 impl Latency {
-    /// The same with its causes longer by this share of the jitter.
+    /// The latency with this share of the jitter added.
     pub(super) fn drawn(self, share: f64) -> Self {
         let more = Duration::from_micros((self.jitter.as_micros() as f64 * share) as u64);
         Self { setup: self.setup + more, wake: self.wake + more, alarm: self.alarm + more, ..self }
     }
 
-    /// After an operation of so many bytes.
+    /// Latency after an operation of `bytes` bytes.
     pub(super) const fn of_bytes(&self, bytes: usize) -> Duration {
         if bytes > self.polled { self.wake } else { Duration::ZERO }
     }
 
-    /// After a pause, ns.
+    /// Latency after a pause, ns.
     pub(super) const fn of_pause(&self, nanoseconds: u32) -> Duration {
         if self.is_spun(nanoseconds) { Duration::ZERO } else { self.alarm }
     }
 
-    /// Does the processor spin a pause away?
+    /// True if a pause is spun.
     pub(super) const fn is_spun(&self, nanoseconds: u32) -> bool {
         nanoseconds as u64 <= self.spun.as_micros() * 1_000
     }

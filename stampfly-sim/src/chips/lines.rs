@@ -1,4 +1,5 @@
-//! The two lines of an [`I2cBus`] as pins, for an owner who takes them from the controller to clock a chip free.
+//! The two lines of an [`I2cBus`] as pins, for a driver that takes them from the controller to
+//! recover the bus.
 
 use super::I2cBus;
 use core::convert::Infallible;
@@ -6,14 +7,14 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use stampfly_drivers::shared::RecoverableI2c;
 use stampfly_drivers::{Recovery, RecoveryError, recover_i2c};
 
-/// The clock line, open drain. Every rising edge is a pulse that the chips see.
+/// Clock line, open drain. Every rising edge is a pulse seen by the chips.
 #[derive(Clone, Debug)]
 pub struct ClockLine {
     bus: I2cBus,
     high: bool,
 }
 
-/// The data line, open drain: low while anybody pulls it.
+/// Data line, open drain: low while any device pulls it.
 #[derive(Clone, Debug)]
 pub struct DataLine {
     bus: I2cBus,
@@ -21,7 +22,7 @@ pub struct DataLine {
 }
 
 impl I2cBus {
-    /// Both lines, let go.
+    /// Both lines, released.
     #[must_use]
     pub fn lines(&self) -> (ClockLine, DataLine) {
         (ClockLine { bus: self.clone(), high: true }, DataLine { bus: self.clone(), high: true })

@@ -1,17 +1,18 @@
-//! The StampFly's chips at register level, behind simulated buses.
+//! Register-level emulators of sensor and radio chips on simulated buses.
 //!
-//! A driver that talks to these buses exchanges the bytes it would exchange with the board: the chips count
-//! conversions, want their start-up sequences and waiting times, and answer a wrong order as the hardware would.
-//! What they measure comes from the same physics as the models in [`sensors`](crate::sensors): the same seed is the
-//! same specimen in both. Use this to test drivers; to test everything behind the drivers use the models, which skip
-//! the bytes and the bus.
+//! A driver on these buses exchanges the same bytes as with the board: the chips count conversions,
+//! require their start-up sequences and waiting times, and answer a wrong sequence as the hardware
+//! does. Their measurements have the same physics as the models in [`sensors`](crate::sensors), and
+//! the same seed gives the same specimen in both. Use the emulators to test drivers; to test the
+//! flight stack use the models, which skip registers and bus.
 //!
-//! The emulators follow the makers' data sheets, as far as those are publicly quoted, and none of this project's
-//! drivers, so that a misreading is not made twice. Every register table names its section. What no public source
-//! confirms is marked *unverified*; so are all section and table numbers except BMP280 3.11 and 8, INA3221 8.4
-//! and 8.6, and the nRF24L01+'s table 20 and the last part of its table of registers, which have been compared with the sheets.
+//! The emulators follow the manufacturers' data sheets, as far as publicly quoted, and are
+//! independent of this project's drivers, so that a misreading is not repeated. Register tables
+//! name their section. Facts without a public source are marked *unverified*. All section and table
+//! numbers are unverified except BMP280 3.11 and 8, INA3221 8.4 and 8.6, and the nRF24L01+'s table
+//! 20 and the last part of its table of registers, which have been compared with the data sheets.
 //!
-//! | emulator | bus | address or clock | data sheet |
+//! | emulator | bus | address or highest clock | data sheet |
 //! |---|---|---|---|
 //! | [`Bmp280`] | [`I2cBus`], or [`SpiBus`] | 0x76, or up to 10 MHz | BST-BMP280-DS001 |
 //! | [`Ina3221`] | [`I2cBus`] | 0x40 | SBOS576 |
@@ -22,17 +23,17 @@
 //! | [`Mpu6000`] | [`SpiBus`] | up to 1 MHz, its data 20 MHz | InvenSense RM-MPU-6000A, PS-MPU-6000A |
 //! | [`Nrf24l01`] | [`SpiBus`], and the [`Air`] | up to 10 MHz | Nordic nRF24L01+ v1.0 |
 //!
-//! | fault | where |
+//! | fault | function |
 //! |---|---|
 //! | dead chip, refused transfers, bit errors, clock stretching | [`Faults`] |
-//! | reset in flight, another part, a sensing element that is broken | [`Attached`] |
-//! | soldered otherwise, covered, another shunt | [`Flaw`] |
+//! | reset in operation, another part, broken sensing element | [`Attached`] |
+//! | wrong mounting, covered sensor, another shunt | [`Flaw`] |
 //! | data line held low by a chip, or shorted to ground | [`I2cBus::hold_sda`], [`I2cBus::short_sda`] |
 //! | data line from the chips stuck | [`SpiBus::hold_miso`] |
 //! | packets lost, channels jammed | [`Air`] |
-//! | chip select that nobody drives yet | [`SpiBus::attach_floating`] |
-//! | clock at the wrong level, wrong mode, wrong order of bits | [`SpiBus::set_controller`], [`SpiPort::with_mode`], [`SpiPort::with_order`] |
-//! | software that takes its time | [`SpiBus::set_latency`], [`I2cBus::set_latency`] |
+//! | undriven chip select | [`SpiBus::attach_floating`] |
+//! | wrong idle level, clock mode or bit order | [`SpiBus::set_controller`], [`SpiPort::with_mode`], [`SpiPort::with_order`] |
+//! | software latency | [`SpiBus::set_latency`], [`I2cBus::set_latency`] |
 
 mod bmi270;
 mod bmm150;
@@ -71,54 +72,60 @@ use embedded_hal::{i2c as hal_i2c, spi as hal_spi};
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// A chip as its registers. Time is an argument and does not go back.
+/// Registers of a chip. Calls have ascending instants.
 ///
-/// Both numbers are wide enough for every chip; one with 8-bit registers uses the lower half.
+/// Addresses and values are wide enough for every chip; a chip with 8-bit registers uses the lower
+/// half.
 pub trait Chip: fmt::Debug {
-    /// Reads a register, with whatever this does to the chip. Registers that do not exist read as zero.
+    /// Reads a register, with the side effects of reading. Registers that do not exist read as
+    /// zero.
     fn read(&mut self, register: u16, now: Instant) -> u16;
-    /// Writes a register. Registers that do not exist or cannot be written swallow the value.
+    /// Writes a register. Writes to registers that do not exist or are read-only are ignored.
     fn write(&mut self, register: u16, value: u16, now: Instant);
     /// Power-on reset.
     fn reset(&mut self, now: Instant);
-    /// Changes what the identity register says.
+    /// Replaces the content of the identity register.
     fn set_id(&mut self, id: u16);
-    /// Breaks or mends the sensing element: the chip answers as before but feels nothing, and its self tests, or those of
-    /// its driver, fail. Every emulator says what that looks like; a chip that feels nothing anyway takes no notice.
+    /// Breaks or repairs the sensing element: the chip answers as before but measures nothing, and
+    /// its self-tests or those of its driver fail. Each emulator documents the effect; chips
+    /// without a sensing element ignore it.
     fn set_broken(&mut self, _broken: bool) {}
-    /// Gives it a flaw, or mends it. A chip to which it cannot happen takes no notice.
+    /// Sets or removes a flaw. Flaws that do not apply to the chip are ignored.
     fn set_flaw(&mut self, _flaw: Option<Flaw>) {}
 }
 
-/// A chip that can sit on an [`I2cBus`]: how it maps bytes to registers.
+/// A chip on an [`I2cBus`]: maps bytes to registers.
 pub trait I2cChip: Chip {
-    /// The address the chip answers to now; `None` when it is held in reset. Most chips keep the one they were
-    /// soldered to.
+    /// The present address; `None` while the chip is held in reset. Most chips keep the address to
+    /// which they were soldered.
     fn address(&self, soldered: u8) -> Option<u8> {
         Some(soldered)
     }
-    /// Soldered to a bus that is busy until this instant: for chips that mind what goes on there when they start.
+    /// Connects the chip to a bus that is busy until the given instant, for chips that are
+    /// sensitive to bus traffic when they start.
     fn wire(&mut self, _busy_until: &Rc<Cell<Instant>>) {}
-    /// Takes byte number `index` after a (repeated) start in write direction. `false` is no acknowledge.
+    /// Receives byte `index` after a (repeated) start in write direction. Returns `false` for no
+    /// acknowledge.
     fn receive(&mut self, index: usize, byte: u8, now: Instant) -> bool;
-    /// Gives byte number `index` after a (repeated) start in read direction.
+    /// Sends byte `index` after a (repeated) start in read direction.
     fn send(&mut self, index: usize, now: Instant) -> u8;
-    /// The transfer is over.
+    /// The stop condition: the transfer is over.
     fn stop(&mut self, _now: Instant) {}
 }
 
-/// A chip that can sit on an [`SpiBus`].
+/// A chip on an [`SpiBus`].
 pub trait SpiChip: Chip {
     /// The fastest clock that the chip allows, Hz.
     const HIGHEST_CLOCK: u32;
-    /// What the chip shifts out while byte number `index` since it was selected comes in: it does not know that one yet. Asked once a byte,
-    /// when the first bit is looked at. All ones where the chip does not drive its line.
+    /// The byte that the chip shifts out during byte `index` since it was selected. Called once per
+    /// byte before the first bit is sampled, when the incoming byte is not known yet. All ones if
+    /// the chip does not drive its line.
     fn answer(&mut self, _index: usize, _now: Instant) -> u8 {
         0xFF
     }
-    /// Byte number `index` has come in.
+    /// Receives byte `index`.
     fn take(&mut self, _index: usize, _byte: u8, _now: Instant) {}
-    /// Takes and gives byte number `index`, where polarity plays no part.
+    /// Exchanges byte `index`, where clock polarity does not matter.
     fn exchange(&mut self, index: usize, byte: u8, now: Instant) -> u8 {
         let answer = self.answer(index, now);
         self.take(index, byte, now);
@@ -132,11 +139,11 @@ pub trait SpiChip: Chip {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BusError {
-    /// Nobody acknowledged the address or a data byte. I²C only.
+    /// The address or a data byte was not acknowledged. I²C only.
     NoAcknowledge(NoAcknowledgeSource),
-    /// The data line is held low by a chip, so no start condition can be made. I²C only.
+    /// A chip holds the data line low, so no start condition is possible. I²C only.
     ArbitrationLost,
-    /// The processor's controller lost bytes. SPI only.
+    /// The processor's controller has lost bytes. SPI only.
     Overrun,
 }
 
@@ -171,7 +178,7 @@ impl hal_spi::Error for BusError {
     }
 }
 
-/// An instant `nanoseconds` after `start`, counted in whole microseconds like everything on the virtual clock.
+/// The instant `nanoseconds` after `start`, rounded down to microseconds, the clock's resolution.
 fn after(start: Instant, nanoseconds: u64) -> Instant {
     start + Duration::from_micros(nanoseconds / 1_000)
 }

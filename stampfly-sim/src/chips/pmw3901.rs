@@ -1,4 +1,5 @@
-//! The optical flow sensor PMW3901MB: PixArt's data sheet ("DS" below), on SPI at up to 2 MHz.
+//! Emulator of the optical flow sensor PMW3901MB: PixArt's data sheet ("DS" below), on SPI at up to
+//! 2 MHz.
 //!
 //! | register | content | DS |
 //! |---|---|---|
@@ -11,18 +12,21 @@
 //! | 0x3A | 0x5A resets | power-up |
 //! | 0x7F | bank of the registers for the performance settings | performance list |
 //!
-//! Bit 7 of the address is set for a write. Between address and data of a read 35 µs have to pass, after a write 45 µs,
-//! after a read 20 µs; at the end of a write the chip select stays low for 35 µs after the last clock, tSCLK-NCS (DS, timing). After power-on it needs 45 ms. The data sheet's list of performance settings has
-//! to be written.
+//! Bit 7 of the address marks a write. 35 µs have to pass between address and data of a read, 45 µs
+//! after a write, 20 µs after a read. At the end of a write the chip select stays low for 35 µs
+//! after the last clock, tSCLK-NCS (DS, timing). Start-up takes 45 ms. The data sheet's list of
+//! performance settings has to be written.
 //!
-//! *Unverified*: that data clocked out too early is zero and commands that come too early are lost (the burst without
-//! its pause is reported to work in practice); that a write whose chip select rises too early is lost (drivers that
-//! do not wait are reported to work as well); zero motion and quality without the performance settings; 0x08 at 0x47
-//! of bank 0x0E, and what 0x67, 0x70, 0x71 and 0x73 say; which of the list's entries matter (those in which its
-//! public copies agree are wanted, in their order and with their pause); that the list can be read back; 5 ms for a reset; observation 0xBF; the picture's sum, maximum and
-//! minimum, which only follow the quality, also in the dark; that a dead array gives pictures without light and without
-//! an exposure. Section numbers differ between the public revisions and are not given.
-//! Not modelled: shutdown, frame capture, the motion pin.
+//! *Unverified*: data clocked out too early are zero, and commands that come too early are lost
+//! (the burst without its pause is reported to work in practice); a write whose chip select rises
+//! too early is lost (drivers without the wait are reported to work as well); zero motion and
+//! quality without the performance settings; 0x08 at 0x47 of bank 0x0E, and the values of 0x67,
+//! 0x70, 0x71 and 0x73; which entries of the list matter (required are those in which its public
+//! copies agree, in their order and with their pause); the list can be read back; 5 ms for a reset;
+//! observation 0xBF; sum, maximum and minimum of the picture, which only follow the quality, also
+//! in the dark; a broken array gives pictures without light and without exposure. Section numbers
+//! differ between the public revisions and are not given. Not modelled: shutdown, frame capture,
+//! the motion pin.
 
 use super::{Chip, Flaw, SpiChip};
 use crate::sensors::flow::FlowPhysics;
@@ -40,11 +44,12 @@ const MOTION: u16 = 0x02;
 const BURST: u8 = 0x16;
 const RESET: u16 = 0x3A;
 const BANK: u16 = 0x7F;
-/// Below this quality the shutter is fully open.
+/// Quality below which the shutter is fully open.
 const DARK: u8 = 25;
 
-/// The performance list, bank, register and value in the order in which its public copies agree. It begins with what the
-/// specimen's own values at 0x70 and 0x71 of bank 0x0E become: 26 + 14 and 45 % of 96.
+/// Performance list: bank, register and value, in the order in which its public copies agree. It
+/// begins with the values derived from the specimen's own at 0x70 and 0x71 of bank 0x0E: 26 + 14
+/// and 45 % of 96.
 #[rustfmt::skip]
 const PERFORMANCE: [(u8, u8, u8); 57] = [
     (0x00, 0x61, 0xAD), (0x00, 0x51, 0x70), (0x0E, 0x70, 0x28), (0x0E, 0x71, 0x2B), (0x00, 0x61, 0xAD),
@@ -60,15 +65,16 @@ const PERFORMANCE: [(u8, u8, u8); 57] = [
     (0x06, 0x63, 0x00), (0x0D, 0x48, 0xC0), (0x0D, 0x6F, 0xD5), (0x00, 0x5B, 0xA0), (0x00, 0x4E, 0xA8),
     (0x00, 0x5A, 0x50), (0x00, 0x40, 0x80),
 ];
-/// Bank and register of the list's entries of whose values the copies differ.
+/// Bank and register of entries whose values differ between the copies.
 const DISPUTED: [(u8, u8); 3] = [(0x14, 0x65), (0x14, 0x63), (0x15, 0x48)];
-/// The entry before which every copy pauses, and for how long at least.
+/// The entry before which every copy pauses, and the least pause.
 const AFTER_PAUSE: (u8, u8, u8) = (0x07, 0x32, 0x44);
 const PAUSE: Duration = Duration::from_micros(10_000);
-/// The specimen's own values at 0x70 and 0x71 of bank 0, from which the list makes settings where 0x73 reads zero.
+/// The specimen's own values at 0x70 and 0x71 of bank 0, from which the list derives settings if
+/// 0x73 reads zero.
 const FACTORY: [u8; 2] = [0x1A, 0x60];
 
-/// The emulator. The same seed is the same specimen as [`FlowModel`](crate::sensors::FlowModel).
+/// The emulator. The same seed gives the same specimen as [`FlowModel`](crate::sensors::FlowModel).
 ///
 /// ```
 /// use embedded_hal::spi::{Operation, SpiDevice};
@@ -93,29 +99,29 @@ pub struct Pmw3901 {
     ready: Instant,
     banks: Vec<[u8; 128]>,
     bank: u8,
-    /// Entries of the performance list that have been written in its order, and when the last was.
+    /// Number of entries of the performance list written in order, and the instant of the last.
     tuned: usize,
     tuned_at: Instant,
-    /// Counts as the last latch left them.
+    /// Counts of the last latch.
     latched: [i16; 2],
     moved: bool,
-    /// The array sees nothing.
+    /// The array is broken.
     broken: bool,
     flaw: Option<Flaw>,
-    /// The next command may begin from here on.
+    /// Earliest begin of the next command.
     idle_until: Instant,
-    /// The address byte of this transfer, when it came, and whether it came late enough.
+    /// Address byte of this transfer, its instant, and whether it came late enough.
     command: u8,
     commanded: Instant,
     accepts: bool,
-    /// The value of a write that is not over, and when it came.
+    /// Value of a write in progress, and its instant.
     written: Option<(u8, Instant)>,
-    /// What a running burst sends.
+    /// Content of the present burst.
     burst: [u8; 12],
 }
 
 impl Pmw3901 {
-    /// A chip that has just been powered.
+    /// A chip after power-on.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
         let now = clock.now();
@@ -142,18 +148,19 @@ impl Pmw3901 {
         chip
     }
 
-    /// Has the performance list been written?
+    /// True if the performance list has been written.
     fn is_tuned(&self) -> bool {
         self.tuned == PERFORMANCE.len()
     }
 
-    /// Follows the performance list: what comes out of its order spoils it.
+    /// Tracks writing of the performance list; an entry out of order restarts it.
     fn tune(&mut self, entry: (u8, u8, u8), now: Instant) {
         let paused = entry != AFTER_PAUSE || now.since(self.tuned_at) >= PAUSE;
         self.tuned = match PERFORMANCE.get(self.tuned) {
             Some(expected) if *expected == entry && paused => self.tuned + 1,
             _ if DISPUTED.contains(&(entry.0, entry.1)) => return,
-            // Written again as it is, or what the list does not know.
+            // Rewriting an entry with its value, or writing a register outside the list, is
+            // harmless.
             None if PERFORMANCE
                 .iter()
                 .rev()
@@ -172,12 +179,13 @@ impl Pmw3901 {
         if self.is_tuned() && !self.broken { quality } else { 0 }
     }
 
-    /// Sum, maximum and minimum of a picture of this quality, upper and lower byte of its shutter.
+    /// Sum, maximum and minimum of a picture of this quality, then upper and lower byte of the
+    /// shutter.
     const fn picture(&self, quality: u8) -> [u8; 5] {
         if self.broken {
             return [0; 5];
         }
-        // Seven bits.
+        // The picture has seven bits.
         let light = quality / 4;
         [light + 20, light + 40, light, if quality < DARK { 0x1F } else { 0x03 }, 0x80]
     }
@@ -185,12 +193,12 @@ impl Pmw3901 {
     fn latch(&mut self, now: Instant) {
         let [x, y] = self.physics.read(now);
         let [x, y, _] = Flaw::turn(self.flaw, [x, y, 0.0]);
-        // Flow along body x is −y of the chip as it is soldered, along body y it is x.
+        // Flow along body x is −y of the chip as mounted, flow along body y is x.
         self.latched = if self.is_tuned() && !self.broken { [y as i16, -x as i16] } else { [0; 2] };
         self.moved = self.latched != [0; 2];
     }
 
-    /// The registers that are not memory, in bank 0.
+    /// Registers of bank 0 with computed content.
     fn measure(&mut self, register: u16, now: Instant) -> Option<u8> {
         let [x, y] = self.latched.map(i16::to_le_bytes);
         Some(match register {
@@ -239,8 +247,8 @@ impl Chip for Pmw3901 {
             return 0;
         }
         let register = register & 0x7F;
-        // The check of the list works on bank 0x0E, the values of the specimen on bank 0 and 0x0E alike; in this bank they
-        // can be overwritten.
+        // The list's check acts in bank 0x0E. The specimen's values are in banks 0 and 0x0E; in
+        // 0x0E they can be overwritten.
         let specimen = self.bank == 0x0E && !matches!(register, 0x70 | 0x71);
         let measured = if self.bank == 0 || specimen { self.measure(register, now) } else { None };
         let stored = self.banks[usize::from(self.bank)][usize::from(register)];
@@ -268,7 +276,7 @@ impl Chip for Pmw3901 {
 
     fn reset(&mut self, now: Instant) {
         self.ready = now + START_UP;
-        // Memory that was never written must not look like a setting: no value of the list is 0xEE.
+        // Unwritten memory must not look like a setting: no value of the list is 0xEE.
         self.banks = vec![[0xEE; 128]; 32];
         self.banks[0x0E][0x70..0x72].copy_from_slice(&FACTORY);
         self.bank = 0;

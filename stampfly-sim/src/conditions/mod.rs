@@ -1,12 +1,13 @@
-//! Under what conditions a vehicle flies: how worn and how cold its battery is, how far one specimen lies from the next, what floor, light
-//! and air it meets.
+//! Conditions of a flight: battery state, spread between specimens, floor, light and air.
 //!
-//! An [airframe](crate::plant::Airframe) says what a vehicle was designed to be; these are the numbers of the world. Each acts in one model, and
-//! each has a neutral value, with which that model is not there at all: [`Conditions::GENTLE`] is a vehicle as its maker would like to
-//! show it. [`Conditions::harsh`] draws them from the seed, as far apart as recordings and data sheets are.
+//! An [airframe](crate::plant::Airframe) contains what a designer decides; conditions contain what
+//! the world decides. Each acts in one model and has a neutral value that disables this model.
+//! [`Conditions::GENTLE`] holds the neutral values, [`Conditions::harsh`] draws values from the
+//! seed, with the spread of recordings and data sheets.
 //!
-//! A row is either the thing itself (`battery_temperature`) or how far specimens lie apart (`…_spread`, `…_scale`): the specimen is drawn
-//! from the seed by the model that has it. Not for what a vehicle's designer decides, nor for [what goes wrong](crate::fault) in a flight.
+//! A row is either a quantity (`battery_temperature`) or a spread between specimens (`…_spread`,
+//! `…_scale`), from which the model draws the specimen with the seed. For failures during a flight
+//! use [`fault`](crate::fault).
 
 mod draw;
 
@@ -25,7 +26,7 @@ parameters! {
     /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
     /// ```
     Conditions,
-    /// No model of this table acts.
+    /// Neutral values: no model of this table acts.
     GENTLE {
         battery_age = 0.0 ["1"] in 0.0 ..= 1.5, "Wear of the battery: 0 is new, 1 at the end of its life.";
         battery_temperature = 25.0 ["degC"] in -20.0 ..= 60.0, "Temperature of the battery.";

@@ -1,28 +1,28 @@
-//! How a flight with a fault may end.
+//! Outcome classes of a flight with faults.
 
 use core::fmt;
 
-/// The end of a flight, from best to worst.
+/// Outcome of a flight, from best to worst.
 ///
-/// The first five are acceptable where the fault's row says so; the other three never are. What separates them in
-/// metres and seconds is the vehicle's business.
+/// The first five may be acceptable, depending on the fault; the other three never are. The vehicle
+/// defines the limits between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
-    /// The vehicle was not allowed to fly.
+    /// The vehicle refused to fly.
     Refused,
-    /// The mission was flown as if nothing had happened.
+    /// The mission was flown without visible effect.
     Transparent,
-    /// The mission was flown to its end, with an alert, another mode or a larger error.
+    /// The mission was flown to its end with an alert, another mode or larger errors.
     Degraded,
-    /// The vehicle landed before the mission was over.
+    /// The vehicle landed before the end of the mission.
     Landed,
-    /// The motors were stopped at once.
+    /// The motors were stopped immediately.
     Cut,
-    /// The vehicle hit the ground, or fell on it.
+    /// The vehicle hit the ground.
     Crashed,
-    /// It left the place where it was to be.
+    /// The vehicle left its intended area.
     FlownAway,
-    /// The motors were still on at the end.
+    /// The motors were still armed at the end.
     KeptOn,
 }
 
@@ -54,13 +54,13 @@ impl Class {
         }
     }
 
-    /// Can such an end be acceptable at all?
+    /// True for classes that can be acceptable.
     #[must_use]
     pub const fn may_be_acceptable(self) -> bool {
         !matches!(self, Self::Crashed | Self::FlownAway | Self::KeptOn)
     }
 
-    /// Is this end no worse than the worst acceptable one?
+    /// True if this class is acceptable and no worse than `worst`.
     #[must_use]
     pub fn is_within(self, worst: Self) -> bool {
         self.may_be_acceptable() && self <= worst

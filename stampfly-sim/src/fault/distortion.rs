@@ -1,55 +1,55 @@
-//! What can happen to a sample between its sensor and the bus.
+//! Changes of samples between their sensor and the bus.
 
 /// A change of one kind of sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distortion {
-    /// The numbers it changes, by their names in the message's schema: `distance`, `gyro` (all three), `gyro[0]`. Empty
-    /// for the whole message.
+    /// Affected values by their names in the message's schema: `distance`, `gyro` (all three),
+    /// `gyro[0]`. Empty for the whole message.
     pub fields: &'static [&'static str],
-    /// What happens to them.
+    /// The effect on them.
     pub effect: Effect,
-    /// Only to so many samples; `None` for as long as the fault lasts.
+    /// Number of samples affected; `None` for the whole duration of the fault.
     pub samples: Option<u32>,
 }
 
-/// What happens to a number.
+/// Effect of a fault on values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
     /// The sample does not arrive.
     Silent,
-    /// It stays as it was in the last sample before the fault.
+    /// The values stay as in the last sample before the fault.
     Stuck,
-    /// It is this.
+    /// The values are replaced.
     Set(f32),
-    /// It is this word, for fields that are no `f32`: flags, counts, truth values.
+    /// The words are replaced, for fields other than `f32`: flags, counts, booleans.
     Word(u32),
-    /// This is added.
+    /// A constant is added.
     Add(f32),
-    /// It is multiplied.
+    /// The values are multiplied.
     Scale(f32),
-    /// It is the remainder of a division by this, as of a phase that has wrapped around.
+    /// The remainder of a division remains, as for a phase that has wrapped around.
     Wrap(f32),
-    /// With this probability it is the value instead.
+    /// With a probability per sample, the values are replaced.
     Outliers {
         /// Probability for each sample, 0 to 1.
         share: f64,
-        /// What it is then.
+        /// Replacement value.
         value: f32,
     },
-    /// With this probability the size is added or subtracted, for each number alone.
+    /// With a probability for each value, the size is added or subtracted.
     Spikes {
         /// Probability for each sample, 0 to 1.
         share: f64,
         /// The size.
         size: f32,
     },
-    /// The first half of the numbers changes places with the second half.
+    /// The first half of the values is exchanged with the second half.
     Swap,
-    /// Samples arrive for the second time of each pair only: missing for the first, present for the second, seconds.
+    /// Samples are missing for `off` seconds, then arrive for `on` seconds, periodically.
     Gaps {
-        /// How long samples are missing.
+        /// Duration of each gap, s.
         off: f64,
-        /// How long they arrive.
+        /// Duration between gaps, s.
         on: f64,
     },
 }
@@ -58,19 +58,19 @@ impl Distortion {
     /// The sample does not arrive.
     pub const SILENT: Self = Self::whole(Effect::Silent);
 
-    /// Of the whole message.
+    /// An effect on the whole message.
     #[must_use]
     pub const fn whole(effect: Effect) -> Self {
         Self::of(&[], effect)
     }
 
-    /// Of these fields.
+    /// An effect on these fields.
     #[must_use]
     pub const fn of(fields: &'static [&'static str], effect: Effect) -> Self {
         Self { fields, effect, samples: None }
     }
 
-    /// Of so many samples.
+    /// Limits the effect to a number of samples.
     #[must_use]
     pub const fn for_samples(self, samples: u32) -> Self {
         Self { samples: Some(samples), ..self }

@@ -1,4 +1,4 @@
-//! Which faults of a flight are active, and how often each has changed something.
+//! Activation state of the faults of one flight, and how often each has acted.
 
 use super::{Fault, Moment, When};
 use core::cell::Cell;
@@ -13,7 +13,8 @@ struct Entry {
     changed: Cell<u64>,
 }
 
-/// The faults of one flight, a handle: clones share them. Everything that a fault can act on holds one and asks it.
+/// The faults of one flight. A handle: clones share the state. Each part on which faults can act
+/// holds a clone.
 ///
 /// ```
 /// use stampfly_sim::fault::{Class, Fault, FaultKind, Injector, Moment};
@@ -43,25 +44,26 @@ impl Injector {
         Self(faults.iter().map(entry).collect())
     }
 
-    /// The faults, in the order in which they were given: their places are what the other functions take.
+    /// The faults in the order given; the other functions take this index as `place`.
     pub fn faults(&self) -> impl Iterator<Item = &Fault> {
         self.0.iter().map(|entry| &entry.fault)
     }
 
-    /// Does a fault wait for this moment, or has one?
+    /// True if a fault begins at this moment, whether or not the moment has come.
     #[must_use]
     pub fn wants(&self, moment: Moment) -> bool {
         self.faults().any(|fault| fault.when == When::Moment(moment))
     }
 
-    /// A moment has come. Only the first time counts.
+    /// Reports that a moment has come. Only the first time counts.
     pub fn reached(&self, moment: Moment, now: Instant) {
         for entry in self.0.iter().filter(|entry| entry.fault.when == When::Moment(moment)) {
+            // Keeps the first instant.
             entry.begun.set(entry.begun.get().or(Some(now)));
         }
     }
 
-    /// Begins the fault at this place now, whatever it waits for: somebody who watches the flight has asked for it.
+    /// Begins a fault now, regardless of its own begin, on request of a user.
     pub fn begin(&self, place: usize, now: Instant, lasts: Option<Duration>) {
         if let Some(entry) = self.0.get(place) {
             entry.begun.set(Some(now));
@@ -69,7 +71,7 @@ impl Injector {
         }
     }
 
-    /// Ends the fault at this place, if it has begun.
+    /// Ends a fault that has begun.
     pub fn end(&self, place: usize, now: Instant) {
         if let Some((entry, begun)) = self.0.get(place).and_then(|entry| Some((entry, entry.begun.get()?)))
             && begun <= now
@@ -78,19 +80,19 @@ impl Injector {
         }
     }
 
-    /// When the fault at this place begins or began; `None` when its moment has not come.
+    /// Begin of a fault; `None` if its moment has not come.
     #[must_use]
     pub fn begins(&self, place: usize) -> Option<Instant> {
         self.0.get(place)?.begun.get()
     }
 
-    /// When the first fault began; `None` when none has.
+    /// Begin of the first fault that has begun by `now`.
     #[must_use]
     pub fn first_begun(&self, now: Instant) -> Option<Instant> {
         self.0.iter().filter_map(|entry| entry.begun.get()).filter(|begun| *begun <= now).min()
     }
 
-    /// Does the fault at this place act now?
+    /// True while the fault acts.
     #[must_use]
     pub fn is_active(&self, place: usize, now: Instant) -> bool {
         self.0.get(place).is_some_and(|entry| {
@@ -101,14 +103,14 @@ impl Injector {
         })
     }
 
-    /// Notes that the fault at this place has changed something.
+    /// Counts an action of the fault.
     pub fn note_change(&self, place: usize) {
         if let Some(entry) = self.0.get(place) {
             entry.changed.set(entry.changed.get() + 1);
         }
     }
 
-    /// How often the fault at this place has changed something.
+    /// Number of times that the fault has acted.
     #[must_use]
     pub fn changes(&self, place: usize) -> u64 {
         self.0.get(place).map_or(0, |entry| entry.changed.get())

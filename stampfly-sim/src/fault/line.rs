@@ -1,4 +1,4 @@
-//! One edge of the bus, with the faults that can act on its samples.
+//! Path of one kind of sample to the bus, with the faults that can act on it.
 
 use super::{Distortion, Effect, Injector};
 use crate::noise::Noise;
@@ -9,17 +9,18 @@ use stampfly_types::{FieldInfo, FieldKind, Instant, Message};
 const STREAM: u64 = 1_300;
 
 struct Acting {
-    /// Its fault's place in the injector.
+    /// Index of its fault in the injector.
     place: usize,
     effect: Effect,
-    /// Samples left.
+    /// Remaining samples to affect.
     left: Option<u32>,
-    /// Words that it changes.
+    /// Indices of the affected words.
     words: Vec<usize>,
     noise: Noise,
 }
 
-/// Everything that can happen to the samples of one kind on their way to the bus. Without faults they pass unchanged.
+/// Applies distortions to samples of one kind on their way to the bus. Without active faults
+/// samples pass unchanged.
 ///
 /// ```
 /// use stampfly_sim::fault::{Class, Distortion, Effect, Fault, FaultKind, Injector, Line};
@@ -36,16 +37,17 @@ struct Acting {
 pub struct Line<M: Message> {
     injector: Injector,
     acting: Vec<Acting>,
-    /// The last sample that no fault has touched.
+    /// The last sample unaffected by faults.
     healthy: Option<M::Words>,
     message: PhantomData<M>,
 }
 
 impl<M: Message> Line<M> {
-    /// A line with these distortions, each with the place of its fault in the injector. `seed` is of everything random.
+    /// A line with these distortions, each with the index of its fault in the injector. `seed`
+    /// feeds the random effects.
     ///
     /// # Panics
-    /// When a distortion names a field that the message does not have.
+    /// If a distortion names a field that the message does not have.
     #[must_use]
     pub fn new(injector: &Injector, distortions: &[(usize, Distortion)], seed: u64) -> Self {
         let acting = distortions.iter().enumerate().map(|(number, (place, distortion))| Acting {
@@ -53,18 +55,19 @@ impl<M: Message> Line<M> {
             effect: distortion.effect,
             left: distortion.samples,
             words: words_of::<M>(distortion),
+            // A stream per fault and distortion: adding a fault changes no other fault's draws.
             noise: Noise::new(seed, STREAM + 100 * *place as u64 + number as u64),
         });
         Self { injector: injector.clone(), acting: acting.collect(), healthy: None, message: PhantomData }
     }
 
-    /// A line on which nothing happens.
+    /// A line without distortions.
     #[must_use]
     pub fn clear() -> Self {
         Self::new(&Injector::new(Instant::ZERO, &[]), &[], 0)
     }
 
-    /// The sample as it arrives; `None` when it does not.
+    /// The sample as it arrives; `None` if it is lost.
     pub fn pass(&mut self, at: Instant, message: &M) -> Option<M> {
         if self.acting.is_empty() {
             return Some(*message);
@@ -76,6 +79,8 @@ impl<M: Message> Line<M> {
             if !self.injector.is_active(acting.place, at) || acting.left == Some(0) {
                 continue;
             }
+            // An active fault counts even if it has not changed this sample, so that `Stuck` keeps
+            // the value from before the fault.
             touched = true;
             acting.left = acting.left.map(|left| left - 1);
             let before = words;
@@ -88,16 +93,18 @@ impl<M: Message> Line<M> {
                 return None;
             }
         }
+        // A value that sticks from the first sample on sticks at that sample.
         if !touched || self.healthy.is_none() {
             self.healthy = Some(original);
         }
-        // Words that are no message any more cannot have come from a driver.
+        // Words that are not a valid message any more could not have come from a driver: the sample
+        // is lost.
         M::from_words(&words)
     }
 }
 
 impl Acting {
-    /// Changes the words; `false` when the sample does not arrive.
+    /// Changes the words; `false` if the sample is lost.
     fn act(&mut self, words: &mut [u32], healthy: Option<&[u32]>, since: f64) -> bool {
         let Self { effect, words: places, noise, .. } = self;
         let mut each = |change: &mut dyn FnMut(f32) -> f32| {
@@ -136,7 +143,8 @@ impl Acting {
     }
 }
 
-/// Which words of the message a distortion changes.
+/// Indices of the words that a distortion changes. On a whole message only `f32` fields are changed
+/// numerically.
 fn words_of<M: Message>(distortion: &Distortion) -> Vec<usize> {
     if distortion.fields.is_empty() {
         let any = matches!(distortion.effect, Effect::Stuck | Effect::Silent);
@@ -158,7 +166,7 @@ fn words_of<M: Message>(distortion: &Distortion) -> Vec<usize> {
     named.collect()
 }
 
-/// Every field with the place of its first word.
+/// Each field with the index of its first word.
 fn starts(fields: &'static [FieldInfo]) -> impl Iterator<Item = (usize, &'static FieldInfo)> {
     fields.iter().scan(0, |next, field| {
         let start = *next;
@@ -192,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Before, during and after a fault of one second.
+    /// Samples before, during and after a fault of one second.
     fn passed(distortion: Distortion) -> [Option<ImuData>; 3] {
         let (injector, mut line) = line(distortion);
         let out = [0, 1, 2].map(|second| line.pass(Instant::from_secs(second), &imu(second as f32)));

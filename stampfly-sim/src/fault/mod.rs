@@ -1,21 +1,23 @@
-//! Faults of a simulated vehicle, as data: what goes wrong, when, and for how long.
+//! Faults of a simulated vehicle as data: kind, begin, duration.
 //!
-//! A vehicle lists its faults in a table of [`FaultKind`]s. A [`Fault`] is one of them at a moment, written as text:
+//! A vehicle lists its faults in a table of [`FaultKind`]s. A [`Fault`] is one of them with a
+//! begin, written as text:
 //!
 //! ```text
 //! NAME[=VALUE]@WHEN[+SECONDS]      tof-stuck=0.03@hover+2
 //! ```
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! |---|---|
 //! | [`FaultKind`], [`Fault`] | a row of a vehicle's table; one fault of one flight |
-//! | [`When`], [`Moment`] | when it begins |
-//! | [`Sizes`], [`Measure`] | how large it plausibly is, and the draw of a campaign |
-//! | [`Injector`] | which faults are active now, and how often each has changed something |
-//! | [`Distortion`], [`Line`] | what happens to samples on their way to the bus |
+//! | [`When`], [`Moment`] | begin of a fault |
+//! | [`Sizes`], [`Measure`] | plausible sizes of a fault, from which campaigns draw |
+//! | [`Injector`] | which faults act now, and how often each has acted |
+//! | [`Distortion`], [`Line`] | effect on samples on their way to the bus |
+//! | [`Class`] | outcome of a flight with faults |
 //!
-//! Use it for faults of sensors, links and actuators in flight. Faults of a chip's registers, for testing one driver,
-//! are in [`chips::Faults`](crate::chips::Faults).
+//! Use it for faults of sensors, links and actuators in flight. For faults of a chip's registers,
+//! to test one driver, use [`chips::Faults`](crate::chips::Faults).
 
 mod class;
 mod distortion;
@@ -34,34 +36,35 @@ pub use when::{Moment, When};
 use core::fmt;
 use stampfly_types::Duration;
 
-/// The invariant that every fault of a flight began and changed something. It is about the flight, not about the vehicle: one without it says nothing.
+/// Identifier of the invariant that every fault of a flight has begun and acted. It concerns the
+/// test, not the vehicle: a flight that violates it proves nothing.
 pub const FAULT_ACTED: &str = "I12";
 
-/// What the number of a fault means.
+/// Value of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultValue {
-    /// There is none.
+    /// No value.
     None,
-    /// A number; without one, the default.
+    /// A value with a default.
     Number {
-        /// Unit, empty where there is none.
+        /// Unit; empty for a dimensionless value.
         unit: &'static str,
-        /// When none is given.
+        /// Value if none is given.
         default: f64,
-        /// Lowest and highest.
+        /// Lowest and highest value.
         range: [f64; 2],
     },
-    /// A number, or none: then the last value before the fault stays.
+    /// A value, or none: then the last value before the fault persists.
     OrLast {
-        /// Unit, empty where there is none.
+        /// Unit; empty for a dimensionless value.
         unit: &'static str,
-        /// Lowest and highest.
+        /// Lowest and highest value.
         range: [f64; 2],
     },
 }
 
 impl FaultValue {
-    /// The unit; empty where there is none.
+    /// The unit; empty without one.
     #[must_use]
     pub const fn unit(&self) -> &'static str {
         match self {
@@ -92,17 +95,17 @@ impl FaultValue {
 /// One row of a vehicle's table of faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultKind {
-    /// Its name in texts.
+    /// Name in texts.
     pub name: &'static str,
-    /// What its number means.
+    /// Its value.
     pub value: FaultValue,
-    /// From which sizes a campaign draws its number; without, the number is always the default.
+    /// Sizes from which a campaign draws the value; without them the campaign uses the default.
     pub sizes: Option<Sizes>,
-    /// The worst end that is acceptable with the default value.
+    /// The worst acceptable class with the default value.
     pub expected: Class,
-    /// The worst end that is acceptable above a size, where it is another.
+    /// Another worst acceptable class above a size.
     pub above: Option<(f64, Class)>,
-    /// What happens.
+    /// Description for users.
     pub meaning: &'static str,
 }
 
@@ -111,13 +114,13 @@ impl FaultKind {
         Self { name, value, sizes: None, expected, above: None, meaning }
     }
 
-    /// A fault without a number.
+    /// A fault without a value.
     #[must_use]
     pub const fn plain(name: &'static str, expected: Class, meaning: &'static str) -> Self {
         Self::new(name, FaultValue::None, expected, meaning)
     }
 
-    /// A fault with a number: unit, default, lowest, highest.
+    /// A fault with a value: unit, default, lowest, highest.
     #[must_use]
     pub const fn number(
         name: &'static str,
@@ -128,7 +131,8 @@ impl FaultKind {
         Self::new(name, FaultValue::Number { unit, default, range: [low, high] }, expected, meaning)
     }
 
-    /// A fault with a number, which without one keeps the last value: unit, lowest, highest.
+    /// A fault with an optional value, without which the last value persists: unit, lowest,
+    /// highest.
     #[must_use]
     pub const fn or_last(
         name: &'static str,
@@ -139,27 +143,27 @@ impl FaultKind {
         Self::new(name, FaultValue::OrLast { unit, range: [low, high] }, expected, meaning)
     }
 
-    /// The same, with another acceptable end above a size.
+    /// Sets another acceptable class above a size.
     #[must_use]
     pub const fn above(self, size: f64, expected: Class) -> Self {
         Self { above: Some((size, expected)), ..self }
     }
 
-    /// The same, with a number that a campaign draws from sizes of this measure and range, for this
-    /// reason.
+    /// Sets the sizes from which a campaign draws the value: measure, range and the reason for the
+    /// range.
     #[must_use]
     pub const fn sized(self, measure: Measure, range: [f64; 2], reason: &'static str) -> Self {
         Self { sizes: Some(Sizes { measure, range, reason }), ..self }
     }
 
-    /// The size of a fault with this number.
+    /// The size of a fault with this value.
     #[must_use]
     pub fn size(&self, number: f64) -> f64 {
         self.sizes.map_or(number, |sizes| sizes.measure.size(number))
     }
 }
 
-/// One fault of one flight. Its text is what [`parse`](Self::parse) reads.
+/// One fault of one flight. Displayed in the syntax of [`parse`](Self::parse).
 ///
 /// ```
 /// use stampfly_sim::fault::{Class, Fault, FaultKind, Moment, When};
@@ -172,21 +176,21 @@ impl FaultKind {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What it is.
+    /// Row of the table.
     pub kind: &'static FaultKind,
-    /// Its number; `None` when it has none or keeps the last value.
+    /// Value; `None` if it has none or keeps the last value.
     pub value: Option<f64>,
-    /// When it begins.
+    /// Begin.
     pub when: When,
-    /// How long it lasts; `None` to the end of the flight.
+    /// Duration; `None` until the end of the flight.
     pub lasts: Option<Duration>,
 }
 
 impl Fault {
-    /// Reads a fault of this table.
+    /// Parses a fault of this table.
     ///
     /// # Errors
-    /// Names what is wrong, and what would be right.
+    /// The problem, and what is accepted instead.
     pub fn parse(text: &str, table: &'static [FaultKind]) -> Result<Self, FaultError> {
         let wrong = |problem| FaultError { text: text.into(), problem };
         let (what, rest) = text.split_once('@').ok_or_else(|| wrong(Problem::NoMoment))?;
@@ -200,6 +204,7 @@ impl Fault {
             (None, _) => kind.value.default(),
             (Some(_), None) => return Err(wrong(Problem::NoValue(kind.name))),
             (Some(value), Some([low, high])) => {
+                // NaN and values out of range are refused.
                 let number = number(value).filter(|value| (low..=high).contains(value));
                 Some(number.ok_or_else(|| wrong(Problem::Value(value.into(), kind)))?)
             }
@@ -213,22 +218,23 @@ impl Fault {
         Ok(Self { kind, value, when, lasts })
     }
 
-    /// The fault of this row with its usual value, which begins when somebody [asks](Injector::begin) for it: by itself not before a
-    /// century has passed.
+    /// The fault of this row with its default value, which [`Injector::begin`] starts on request.
+    /// On its own it would begin after a century.
     #[must_use]
     pub const fn on_demand(kind: &'static FaultKind) -> Self {
         let when = When::After(Duration::from_secs(100 * 365 * 86_400));
         Self { kind, value: kind.value.default(), when, lasts: None }
     }
 
-    /// These, and every other of the table [on demand](Self::on_demand): what somebody who watches a flight can break.
+    /// These faults, and all others of the table [on demand](Self::on_demand): everything that a
+    /// user can inject during the flight.
     #[must_use]
     pub fn and_on_demand(faults: &[Self], table: &'static [FaultKind]) -> Vec<Self> {
         let others = table.iter().filter(|kind| faults.iter().all(|fault| fault.kind != *kind));
         faults.iter().copied().chain(others.map(Self::on_demand)).collect()
     }
 
-    /// The worst end that is acceptable.
+    /// The worst acceptable class.
     #[must_use]
     pub fn expected(&self) -> Class {
         match (self.kind.above, self.value) {
@@ -242,13 +248,14 @@ fn number(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|value: &f64| value.is_finite())
 }
 
-/// Up to an hour.
+/// Parses 0 to 3600 seconds.
 fn seconds(text: &str) -> Option<Duration> {
     let seconds = number(text).filter(|seconds| (0.0..=3600.0).contains(seconds))?;
     Some(Duration::from_micros((seconds * 1e6).round() as u64))
 }
 
-/// Seconds with the digits that were given: a division rounds to the nearest number, a product with 1e-6 does not.
+/// Seconds with the digits that were given: dividing rounds to the nearest value, multiplying by
+/// 1e-6 does not.
 fn shown(time: Duration) -> f64 {
     time.as_micros() as f64 / 1e6
 }
@@ -264,7 +271,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Why a text is no fault of a vehicle.
+/// Why a text is not a fault of this vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultError {
     text: String,

@@ -1,40 +1,40 @@
-//! How large a fault is: the range that is plausible, with the reason, and the draw of a campaign.
+//! Plausible sizes of a fault, and the draw of a campaign.
 //!
-//! The *size* of a fault is the distance of its number from the number with which it changes
-//! nothing. A campaign draws sizes evenly in their logarithm, so that small faults, which are hard
-//! to find, are as likely as gross ones. An even draw over the range would hardly ever give a small
-//! one. Use it for faults with a number; others have no size.
+//! The *size* of a fault is the distance of its value from the value without effect. A campaign
+//! draws sizes uniformly in their logarithm, so that small faults, which are hard to detect, are as
+//! likely as gross ones; a uniform draw over the range would hardly ever give a small one. For
+//! faults with a value only.
 
 use crate::noise::Noise;
 use core::fmt;
 
-/// From which sizes a campaign draws, and what a size is.
+/// Sizes from which a campaign draws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
-    /// What a size is.
+    /// Definition of the size.
     pub measure: Measure,
-    /// Smallest and largest, both above zero, in the fault's unit; of [`Measure::Times`] both above
-    /// one.
+    /// Smallest and largest size in the fault's unit, both above zero; for [`Measure::Times`] both
+    /// above one.
     pub range: [f64; 2],
-    /// Why these are plausible.
+    /// Why this range is plausible.
     pub reason: &'static str,
 }
 
-/// What the size of a fault is.
+/// Definition of a fault's size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// The number itself.
+    /// The value itself.
     Number,
-    /// The number without its sign, which is either one.
+    /// The magnitude of the value, which may have either sign.
     EitherWay,
-    /// How far the number is below one: a share that is left.
+    /// One minus the value: for a share that remains.
     BelowOne,
-    /// The number or its reciprocal, whichever is above one: a factor.
+    /// The value or its reciprocal, whichever is above one: for a factor.
     Times,
 }
 
 impl Measure {
-    /// The size of a fault with this number.
+    /// The size of a fault with this value.
     #[must_use]
     pub fn size(self, number: f64) -> f64 {
         match self {
@@ -47,7 +47,7 @@ impl Measure {
 }
 
 impl Sizes {
-    /// A number whose size is drawn evenly in its logarithm, with three digits.
+    /// Draws a value whose size is uniform in its logarithm, rounded to three digits.
     ///
     /// ```
     /// use stampfly_sim::Noise;
@@ -59,6 +59,8 @@ impl Sizes {
     /// ```
     pub fn draw(&self, noise: &mut Noise) -> f64 {
         let [low, high] = self.range;
+        // Three digits survive being written and parsed, so a campaign's fault can be repeated from
+        // its text.
         let size = digits(low * libm::pow(high / low, noise.unit())).clamp(low, high);
         match self.measure {
             Measure::Number => size,
@@ -71,12 +73,12 @@ impl Sizes {
     }
 }
 
-/// A number as it is written with three digits, and read.
+/// Rounds to three significant digits.
 fn digits(number: f64) -> f64 {
     format!("{number:.2e}").parse().unwrap_or(number)
 }
 
-/// The range, as people read it.
+/// The range for display.
 impl fmt::Display for Sizes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.range;
@@ -99,8 +101,8 @@ mod tests {
         Sizes { measure, range, reason: "a test" }
     }
 
-    /// The largest distance between the shares of sizes up to each of them and those of an even
-    /// draw of the logarithm.
+    /// Kolmogorov-Smirnov distance between the drawn sizes and a uniform distribution of the
+    /// logarithm.
     fn distance(sizes: &Sizes, seed: u64) -> f64 {
         let [low, high] = sizes.range.map(libm::log);
         let mut noise = Noise::new(seed, 1);
@@ -112,7 +114,7 @@ mod tests {
         shares.iter().enumerate().map(apart).fold(0.0, f64::max)
     }
 
-    /// Kolmogorov and Smirnov: one draw in a hundred is farther from its distribution than 1.63/√n.
+    /// Critical value of the Kolmogorov-Smirnov test at 1 %: 1.63/√n.
     #[test]
     fn sizes_are_even_in_their_logarithm() {
         let bound = 1.63 / (DRAWS as f64).sqrt();
@@ -132,7 +134,7 @@ mod tests {
         let [low, high] = [0.01f64, 10.0];
         let mut noise = Noise::new(1, 1);
         let small = (0..DRAWS).filter(|_| low + (high - low) * noise.unit() < 0.1).count();
-        // A third of the decades has less than a hundredth of the numbers.
+        // The smallest third of the decades holds less than a hundredth of a uniform draw.
         assert!(small < DRAWS / 50, "{small}");
     }
 
@@ -142,7 +144,7 @@ mod tests {
         for measure in [Measure::Number, Measure::EitherWay, Measure::BelowOne, Measure::Times] {
             let sizes = sizes(measure, if measure == Measure::Times { [1.1, 3.0] } else { [0.1, 1.0] });
             let numbers: Vec<_> = (0..500).map(|_| sizes.draw(&mut noise)).collect();
-            // A reciprocal is rounded to three digits once more.
+            // The rounded reciprocal of a size may lie slightly outside the range.
             let [low, high] = [sizes.range[0] * 0.99, sizes.range[1] * 1.01];
             let outside = numbers.iter().find(|number| !(low..=high).contains(&measure.size(**number)));
             assert_eq!(outside, None, "{measure:?}");

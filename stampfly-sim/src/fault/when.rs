@@ -1,43 +1,44 @@
-//! When a fault begins: at a moment of the flight, or after a time.
+//! Begin of a fault: at a moment of the flight, or after a time.
 
 use core::fmt;
 use stampfly_types::Duration;
 
-/// A moment of a flight. The vehicle's surroundings say when it has come.
+/// A moment of a flight. The vehicle's surroundings report when it has come.
 ///
-/// [`USUAL`](Self::USUAL) ones come in every flight that takes off, flies to a place and lands.
-/// Another one comes when the pilot or the program does the thing that it is named after.
-/// [`Vehicle::moments`](crate::vehicle::Vehicle::moments) lists those of a flight.
+/// [`USUAL`](Self::USUAL) moments come in every flight that takes off, flies to a position and
+/// lands. The others come with the action of pilot or program that they are named after.
+/// [`Vehicle::moments`](crate::vehicle::Vehicle::moments) lists the moments of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// The still calibration after power-on begins.
+    /// Start of the calibration at rest after power-on.
     Calibration,
-    /// It stands and may be armed. It is armed two seconds later, so that a fault can be noticed before.
+    /// On the ground and ready to arm. Arming follows two seconds later, so that a fault can be
+    /// detected before.
     Ground,
-    /// The motors begin to turn.
+    /// The motors start.
     Spool,
-    /// It climbs and has left the ground.
+    /// Climbing, off the ground.
     TakeOff,
-    /// It has flown for a second.
+    /// One second after take-off.
     Hover,
-    /// It flies to another place.
+    /// Flying to another position.
     Move,
-    /// It begins to turn over.
+    /// Start of a flip.
     Flip,
-    /// The flight mode changes in the air.
+    /// Change of the flight mode in the air.
     Mode,
-    /// The throttle stick is pulled to its lowest in the air.
+    /// Throttle stick at its lowest in the air.
     Chop,
-    /// A parameter is changed.
+    /// Change of a parameter.
     Parameter,
-    /// It sinks, in order to land.
+    /// Descending to land.
     Landing,
-    /// It touches the ground, landing.
+    /// Ground contact when landing.
     Touch,
 }
 
 impl Moment {
-    /// Every moment, in the order of a flight.
+    /// All moments in the order of a flight.
     pub const ALL: [Self; 12] = [
         Self::Calibration,
         Self::Ground,
@@ -53,11 +54,11 @@ impl Moment {
         Self::Touch,
     ];
 
-    /// Those of a flight that takes off, flies to a place and lands, in their order.
+    /// Moments of every flight that takes off, flies to a position and lands, in order.
     pub const USUAL: [Self; 7] =
         [Self::Ground, Self::Spool, Self::TakeOff, Self::Hover, Self::Move, Self::Landing, Self::Touch];
 
-    /// Its name in texts.
+    /// Name in texts.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -77,17 +78,17 @@ impl Moment {
     }
 }
 
-/// When a fault begins.
+/// Begin of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
     /// At a moment of the flight.
     Moment(Moment),
-    /// This long after power-on.
+    /// After this time since power-on.
     After(Duration),
 }
 
 impl When {
-    /// Reads a moment's name or a number of seconds.
+    /// Parses the name of a moment or a number of seconds.
     pub(super) fn parse(text: &str) -> Option<Self> {
         match Moment::ALL.into_iter().find(|moment| moment.name() == text) {
             Some(moment) => Some(Self::Moment(moment)),

@@ -1,73 +1,75 @@
-//! Lithium cells of the high-voltage kind, in series.
+//! Model of a LiHV battery: cells in series.
 //!
-//! Open-circuit voltage from the state of charge, minus a resistance that acts at once and one that
-//! acts slowly. Temperature and ageing change these: `wear.rs`.
+//! Terminal voltage = open-circuit voltage of the state of charge − instantaneous resistance ×
+//! current − polarisation, which follows the current with one time constant. Temperature and ageing
+//! change the parameters, see `wear.rs`.
 //!
-//! Battery and motors are one circuit: the voltage of the one is the current of the others.
-//! [`Battery::under`] solves it as it is; a loop that takes the voltage of the step before swings
-//! from step to step as soon as the resistance times the motors' conductance exceeds one, 0.21 Ω
-//! for a StampFly.
+//! Battery and motors form one circuit: the motors' current depends on the voltage, and the voltage
+//! on their current. [`Battery::under`] solves it exactly. Using the voltage of the previous step
+//! instead oscillates as soon as resistance times conductance of the motors exceeds one, which is
+//! 0.21 Ω for a StampFly.
 
-/// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge (typical discharge curve at rest).
+/// Open-circuit voltage of a LiHV cell at 0, 10, …, 100 % of charge, V (typical discharge curve at
+/// rest).
 const OPEN_CIRCUIT: [f64; 11] = [3.20, 3.58, 3.67, 3.72, 3.76, 3.81, 3.88, 3.97, 4.08, 4.20, 4.35];
 
-/// What a battery is made of.
+/// Parameters of a battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatterySpec {
-    /// In series.
+    /// Number of cells in series.
     pub cells: f64,
-    /// At the start, 0 to 1.
+    /// State of charge at the start, 0 to 1.
     pub charge: f64,
-    /// A·h.
+    /// Capacity, A·h.
     pub capacity: f64,
-    /// That acts at once, Ω.
+    /// Instantaneous resistance, Ω.
     pub resistance: f64,
-    /// That acts with the time constant, Ω.
+    /// Resistance of the polarisation, Ω.
     pub polarisation: f64,
-    /// s.
+    /// Time constant of the polarisation, s.
     pub time_constant: f64,
 }
 
 impl BatterySpec {
-    /// A full cell of 1 A·h, of no maker.
+    /// A generic full cell of 1 A·h.
     pub const CELL: Self =
         Self { cells: 1.0, charge: 1.0, capacity: 1.0, resistance: 0.02, polarisation: 0.01, time_constant: 10.0 };
 }
 
-/// Something that draws the more current, the more voltage there is, and nothing below some
-/// voltage: a motor that turns.
+/// A load whose current grows linearly with voltage and is zero below a threshold: a turning motor.
 ///
 /// ```
 /// use stampfly_sim::plant::{Battery, BatterySpec, Load};
 /// let battery = Battery::new(&BatterySpec { resistance: 0.5, ..BatterySpec::CELL }, 0.0);
-/// // A motor of 0.5 Ω whose own voltage is 2 V: what is above that is halved.
+/// // A motor of 0.5 Ω with a back-EMF of 2 V: battery and motor share the difference equally.
 /// let motor = Load { conductance: 2.0, back: 4.0 };
 /// let voltage = battery.under(0.0, &[motor]);
 /// assert!((voltage - 0.5 * (4.35 + 2.0)).abs() < 1e-9);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
-    /// A/V.
+    /// Conductance, A/V.
     pub conductance: f64,
-    /// What its own voltage keeps back, A.
+    /// Current subtracted because of the back-EMF, A.
     pub back: f64,
 }
 
 impl Load {
-    /// Of a motor with this duty cycle, resistance, Ω, and own voltage, V.
+    /// Load of a motor with this duty cycle, winding resistance, Ω, and back-EMF, V. Current flows
+    /// during the share `duty` of the time, so the conductance has `duty` squared.
     pub(super) fn of_motor(duty: f64, resistance: f64, own: f64) -> Self {
         let share = duty / resistance;
         Self { conductance: duty * share, back: share * own }
     }
 
-    /// Current at a voltage, A.
+    /// Battery current at a terminal voltage, A.
     #[must_use]
     pub fn current(&self, voltage: f64) -> f64 {
         (self.conductance * voltage - self.back).max(0.0)
     }
 }
 
-/// The battery.
+/// A battery with its state.
 ///
 /// ```
 /// use stampfly_sim::plant::{Battery, BatterySpec};
@@ -78,12 +80,12 @@ impl Load {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Battery {
-    /// Coulombs drawn since the start.
+    /// Charge drawn since the start, C.
     drawn: f64,
     current: f64,
     polarisation: f64,
     voltage: f64,
-    /// Without load, at the present state of charge.
+    /// Open-circuit voltage at the present state of charge.
     open_circuit: f64,
     cells: f64,
     initial: f64,
@@ -94,7 +96,7 @@ pub struct Battery {
 }
 
 impl Battery {
-    /// A full cell from which nothing is ever drawn: of a vehicle whose battery does not matter.
+    /// A full cell from which no current is drawn: the default of vehicles without a battery model.
     pub const UNUSED: Self = {
         let BatterySpec { cells, charge, capacity, resistance, polarisation, time_constant } = BatterySpec::CELL;
         Self {
@@ -112,7 +114,7 @@ impl Battery {
         }
     };
 
-    /// A battery from which `current` amperes are drawn already.
+    /// A battery that already delivers `current`, A.
     #[must_use]
     pub fn new(spec: &BatterySpec, current: f64) -> Self {
         let mut battery = Self {
@@ -132,14 +134,15 @@ impl Battery {
         battery
     }
 
-    /// The terminal voltage at which these loads, and what always draws `idle` amperes, take what
-    /// the battery gives, V.
+    /// Terminal voltage, V, at which the loads and a constant `idle` current, A, draw what the
+    /// battery delivers.
     #[must_use]
     pub fn under(&self, idle: f64, loads: &[Load]) -> f64 {
         let source = self.open_circuit - self.polarisation - self.resistance * idle;
         let (mut voltage, mut drew) = (source, usize::MAX);
-        // Linear for the loads that draw. Without one that does not the voltage is lower, so that
-        // none comes back: as many that draw are the same ones, and no more passes than loads.
+        // The circuit is linear for the loads that conduct. Dropping loads that do not conduct
+        // lowers the voltage, so a dropped load never returns: the count stays the same after at
+        // most one pass per load, and the loop ends.
         loop {
             let drawing = loads.iter().filter(|load| load.conductance * voltage > load.back);
             let (count, conductance, back) = drawing
@@ -153,28 +156,29 @@ impl Battery {
         voltage.max(0.0)
     }
 
-    /// Draws `current` amperes for `dt` seconds.
+    /// Draws `current`, A, for `dt`, s.
     pub fn step(&mut self, dt: f64, current: f64) {
         self.current = current;
         self.drawn += current * dt;
+        // Explicit Euler: a step is far shorter than the time constant.
         self.polarisation += (current * self.slow_resistance - self.polarisation) * (dt / self.time_constant);
         self.open_circuit = self.at_rest();
         self.voltage = (self.open_circuit - current * self.resistance - self.polarisation).max(0.0);
     }
 
-    /// Terminal voltage under the present load, volts.
+    /// Terminal voltage under the present load, V.
     #[must_use]
     pub fn voltage(&self) -> f64 {
         self.voltage
     }
 
-    /// Present current, amperes.
+    /// Present current, A.
     #[must_use]
     pub fn current(&self) -> f64 {
         self.current
     }
 
-    /// Charge drawn since the start, coulombs.
+    /// Charge drawn since the start, C.
     #[must_use]
     pub fn drawn(&self) -> f64 {
         self.drawn
@@ -186,14 +190,15 @@ impl Battery {
         (self.initial - self.drawn / self.capacity).max(0.0)
     }
 
-    /// Voltage without load at the present state of charge, volts.
+    /// Open-circuit voltage at the present state of charge, V.
     #[must_use]
     pub fn open_circuit(&self) -> f64 {
         self.open_circuit
     }
 
-    /// By the discharge curve.
+    /// Open-circuit voltage from the discharge curve, linear between its points.
     fn at_rest(&self) -> f64 {
+        // Ten intervals of 10 % each; the index is limited for a full cell.
         let position = self.charge().min(1.0) * 10.0;
         let below = (position as usize).min(9);
         let (low, high) = (OPEN_CIRCUIT[below], OPEN_CIRCUIT[below + 1]);
@@ -237,7 +242,8 @@ mod tests {
     fn battery_and_loads_are_one_circuit() {
         for (resistance, duty) in [(0.0, 1.0), (0.06, 0.6), (0.28, 1.0), (1.0, 1.0)] {
             let battery = Battery::new(&BatterySpec { resistance, ..SPEC }, 0.0);
-            // One stands, one turns slowly, one fast, and one so fast that it draws nothing.
+            // Duties at rest, at low speed, at high speed, and one whose back-EMF exceeds the
+            // battery voltage.
             let loads = [0.0, 1.0, 2.0, 5.0].map(|own| Load::of_motor(duty, 0.76, own));
             let voltage = battery.under(0.15, &loads);
             let current = 0.15 + loads.iter().map(|load| load.current(voltage)).sum::<f64>();

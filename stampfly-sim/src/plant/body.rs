@@ -1,7 +1,9 @@
-//! What a [`World`](crate::World) can hold: any vehicle that moves as one rigid body.
+//! Interface of a vehicle that moves as one rigid body in a [`World`](crate::World).
 //!
-//! [`Body`] is the vehicle in motion, [`Airframe`] the numbers of which it is made. Implement both for a vehicle of another kind. What only
-//! one kind has stays with it: [`World::inspect_as`](crate::World::inspect_as) and [`World::change`](crate::World::change) reach it.
+//! [`Body`] is the vehicle in motion, [`Airframe`] the set of parameters from which it is made.
+//! Implement both for a vehicle of another kind. Features that only one kind has are reached
+//! through [`World::inspect_as`](crate::World::inspect_as) and
+//! [`World::change`](crate::World::change).
 
 use super::{
     Battery, GRAVITY, Motion, ParameterError, ParameterInfo, Plant, PlantParameters, Pose, ROTORS, RotorFault,
@@ -12,24 +14,26 @@ use core::any::Any;
 use core::fmt;
 use nalgebra::Vector3;
 
-/// What a vehicle does to the sensors that it carries.
+/// Disturbance of the sensors by the vehicle that carries them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbance {
-    /// Field per ampere of battery current above [`Body::idle_current`], body FRD, µT/A.
+    /// Magnetic field per ampere of battery current above [`Body::idle_current`], body FRD, µT/A.
     pub field: [f64; 3],
-    /// Pressure at the barometer when all rotors turn at [`Body::nominal_rotor_speed`], Pa. It grows with the square of the speed, and is three
-    /// times as much close to the ground.
+    /// Pressure at the barometer when all rotors turn at [`Body::nominal_rotor_speed`], Pa. It
+    /// grows with the square of the speed. By default it is three times as large close to the
+    /// ground (`baro_wash_floor` of [`Conditions`]).
     pub wash: f64,
 }
 
 impl Disturbance {
-    /// None at all.
+    /// No disturbance.
     pub const NONE: Self = Self { field: [0.0; 3], wash: 0.0 };
 }
 
 /// A vehicle in its surroundings, advanced step by step.
 ///
-/// A vehicle needs two of these; the others are for what flies, and for what disturbs its sensors.
+/// [`step`](Self::step) and [`motion`](Self::motion) are required; the other functions serve flying
+/// vehicles and disturbances of sensors.
 ///
 /// ```
 /// use stampfly_sim::plant::{Body, GRAVITY, Motion, STEP};
@@ -40,7 +44,7 @@ impl Disturbance {
 ///
 /// impl Body for Trolley {
 ///     fn step(&mut self) {
-///         // Somebody pushes: a metre a second more every second, forward.
+///         // A constant push forward of 1 m/s².
 ///         self.0.specific_force.x = 1.0;
 ///         self.0.advance(STEP.seconds_f64(), GRAVITY);
 ///     }
@@ -58,20 +62,21 @@ pub trait Body: Any + fmt::Debug {
     /// Advances by one [`STEP`](super::STEP).
     fn step(&mut self);
 
-    /// Where it is and how it moves.
+    /// Position, attitude and their derivatives.
     fn motion(&self) -> &Motion;
 
-    /// Gravity, m/s². It does not change. By default [`GRAVITY`].
+    /// Gravity, m/s², constant during a flight. By default [`GRAVITY`].
     fn gravity(&self) -> f64 {
         GRAVITY
     }
 
-    /// Velocity of the air at this height above the ground, world NED, m/s. By default there is no wind.
+    /// Velocity of the air at this height above the ground, m; world NED, m/s. By default still
+    /// air.
     fn air(&self, _height: f64) -> Vector3<f64> {
         Vector3::zeros()
     }
 
-    /// Density of the air, kg/m³. By default the standard atmosphere's at sea level.
+    /// Density of the air, kg/m³. By default that of the standard atmosphere at sea level.
     fn air_density(&self) -> f64 {
         1.225
     }
@@ -81,66 +86,71 @@ pub trait Body: Any + fmt::Debug {
         &Battery::UNUSED
     }
 
-    /// Does anything touch the ground? By default always, as of what rolls.
+    /// True while any part touches the ground. By default always, as for a vehicle on wheels.
     fn contact(&self) -> bool {
         true
     }
 
-    /// In how many steps something has touched the ground that does not carry the vehicle there: a
-    /// propeller, a wing tip. By default none.
+    /// Number of steps in which a part that does not carry the vehicle touched the ground: a
+    /// propeller, a wing tip. By default 0.
     fn scrapes(&self) -> u64 {
         0
     }
 
-    /// Rotor speed in usual flight, rad/s. By default 1: what has no rotors must not divide by nothing.
+    /// Rotor speed in normal flight, rad/s, by which disturbances are scaled. By default 1, so that
+    /// a body without rotors causes no division by zero.
     fn nominal_rotor_speed(&self) -> f64 {
         1.0
     }
 
-    /// What everything but the motors draws, A. By default nothing.
+    /// Current of everything except the motors, A. By default 0.
     fn idle_current(&self) -> f64 {
         0.0
     }
 
-    /// What it does to its sensors. By default nothing.
+    /// Disturbance of the sensors. By default none.
     fn disturbance(&self) -> Disturbance {
         Disturbance::NONE
     }
 
-    /// What stands around it. By default a level ground and nothing else.
+    /// The scene around the vehicle. By default a level floor only.
     fn scene(&self) -> &Scene {
         &Scene::LEVEL
     }
 
-    /// Sets the duty cycles of the motors, 0 to 1. By default ignored: a body that is driven otherwise is reached by
-    /// [`World::change`](crate::World::change).
+    /// Sets the duty cycles of the motors, 0 to 1. By default ignored; a body with other actuators
+    /// is commanded through [`World::change`](crate::World::change).
     fn set_duty(&mut self, _duty: [f64; ROTORS]) {}
 
-    /// Breaks or mends a rotor, from 0; one that does not exist is ignored.
+    /// Sets the fault of a rotor, counted from 0. A rotor that does not exist is ignored, and so is
+    /// every fault by default.
     fn set_rotor_fault(&mut self, _rotor: usize, _fault: RotorFault) {}
 }
 
-/// The numbers of which a body is made, each with a name.
+/// Named parameters from which a body is made.
 pub trait Airframe: Clone + fmt::Debug + PartialEq {
-    /// What is made of them.
+    /// The body made from them.
     type Body: Body;
 
-    /// A body in this air at `pose`; `None` stands it on the ground at the origin, facing north. `seed` is of everything random.
+    /// A body in this air at `pose`; `None` places it on the ground at the origin, facing north.
+    /// `seed` determines all random values.
     fn body(&self, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self::Body;
 
-    /// The same numbers under these conditions, as far as they can say it: the battery worn and cold, the specimen of this seed as heavy as it
-    /// is. By default as they are.
+    /// These parameters under the conditions, as far as parameters can express them: battery wear
+    /// and temperature, mass of this seed's specimen. By default unchanged.
     #[must_use]
     fn under(&self, _conditions: &Conditions, _seed: u64) -> Self {
         self.clone()
     }
 
-    /// The [body](Self::body) under these conditions. By default of the numbers that are [under](Self::under) them.
+    /// The [body](Self::body) under these conditions. By default made from the parameters
+    /// [under](Self::under) them.
     fn body_under(&self, conditions: &Conditions, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self::Body {
         self.under(conditions, seed).body(wind, pose, seed)
     }
 
-    /// What its rotors carry at full throttle, in weights. By default there is no limit: not every vehicle is carried by rotors.
+    /// Lift of the rotors at full throttle, in weights. By default infinite, for vehicles that
+    /// rotors do not carry.
     fn lift(&self) -> f64 {
         f64::INFINITY
     }
@@ -148,13 +158,14 @@ pub trait Airframe: Clone + fmt::Debug + PartialEq {
     /// Sets a parameter by name.
     ///
     /// # Errors
-    /// When there is no such parameter or the value makes no sense; nothing changes then.
+    /// If no parameter has this name or the value is out of range; nothing changes then.
     fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError>;
 
-    /// Every parameter.
+    /// All parameters.
     fn list(&self) -> Vec<ParameterInfo>;
 
-    /// Are these numbers together a vehicle that can be simulated? By default yes.
+    /// Checks that the parameters together describe a vehicle that can be simulated. By default
+    /// accepted.
     ///
     /// # Errors
     /// [`ParameterError::Together`] with the reason.
@@ -201,7 +212,7 @@ impl Body for Plant {
     }
 
     fn disturbance(&self) -> Disturbance {
-        // What a flight record of the StampFly shows between standing and hovering.
+        // Differences between standing and hovering in a flight record of the StampFly.
         Disturbance { field: [-13.0, 20.0, -7.0], wash: 2.5 }
     }
 

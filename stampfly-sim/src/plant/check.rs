@@ -1,25 +1,29 @@
-//! Which numbers together are no quadrotor, or none that can be simulated.
+//! Rejects combinations of parameters that are not a quadrotor or cannot be simulated.
 //!
-//! Each number has a [range](super::ParameterInfo::range), wide enough for vehicles from 10 g to 2 kg. What is possible in a range may be
-//! impossible beside the other numbers: a battery of 1 Ω in a vehicle of 37 g, a foot so hard that one step of the physics is too long for it. A
-//! flight with such numbers ends somehow, and says nothing about any vehicle. So it is refused, with the reason.
+//! Each parameter has a [range](super::ParameterInfo::range) wide enough for vehicles from 10 g to
+//! 2 kg. Within the ranges, combinations are still possible that make no sense: a battery of 1 Ω in
+//! a vehicle of 37 g, feet too stiff for the step of the physics. A flight with them would give an
+//! arbitrary result, so it is refused with the reason.
 //!
-//! For what somebody types. Code that fills in a [`PlantParameters`] may do without, as a test does that wants a body without weight.
+//! For parameters entered by users. Code that constructs [`PlantParameters`] may skip the check,
+//! for example a test with a weightless body.
 
 use super::{DT, ParameterError, PlantParameters, ROTORS};
 use crate::plant::battery::Battery;
 
-/// The least share of the weight that the rotors have to make at full duty. A vehicle that lifts nine tenths of itself is a test of the
-/// flight stack (does it give up?); one whose rotors do not even make half of it is no vehicle: they do not spin up.
+/// Least lift at full duty, in weights. A vehicle that lifts 0.9 of its weight is a valid test of
+/// the flight stack. Below one half the rotors do not spin up.
 const LIFT: f64 = 0.5;
-/// Largest angle of a spring's oscillation in one step, rad. An explicit step breaks down at 2.
+/// Largest phase of a contact spring's oscillation per step, rad. An explicit step is unstable
+/// above 2.
 const SPRING: f64 = 1.0;
-/// Largest share of a velocity that a damper takes away in one step. An explicit step breaks down at 2.
+/// Largest share of a velocity that a damper removes per step. An explicit step is unstable above
+/// 2.
 const DAMPER: f64 = 1.5;
-/// The rate at which the drag of turning is looked at, rad/s: the end of the gyro's range.
+/// Rate at which rotational drag is evaluated, rad/s: the end of the gyro's range.
 const RATE: f64 = 35.0;
 
-/// What the rotors make at full duty, when they turn steadily.
+/// Steady state of the rotors at full duty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FullThrottle {
     /// Sum of thrusts over the weight; infinite without gravity.
@@ -31,7 +35,8 @@ pub struct FullThrottle {
 }
 
 impl PlantParameters {
-    /// What ideal rotors make at full duty of a battery as charged as at the start, after its slow resistance has acted.
+    /// Steady state of rotors without spread at full duty, with the battery's initial charge and
+    /// settled polarisation.
     #[must_use]
     pub fn full_throttle(&self) -> FullThrottle {
         let battery = self.battery();
@@ -43,7 +48,8 @@ impl PlantParameters {
             let each = ((voltage - constant * speed) / self.motor_resistance).max(0.0);
             (speed, ROTORS as f64 * each + self.board_current)
         };
-        // The more voltage, the more current, the less voltage is left: there is one that fits.
+        // The current grows with the voltage, and the remaining voltage falls with the current:
+        // bisection finds their unique intersection.
         let (mut low, mut high) = (0.0, open);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
@@ -55,19 +61,19 @@ impl PlantParameters {
         FullThrottle { lift: thrust / (self.mass * self.gravity), voltage: low, current }
     }
 
-    /// The speed at which a motor turns steadily on this voltage, rad/s.
+    /// Steady speed of a motor at this voltage, rad/s: the positive root of the voltage curve.
     fn steady_speed(&self, voltage: f64) -> f64 {
         let Self { motor_voltage_a: a, motor_voltage_b: b, motor_voltage_c: c, .. } = *self;
         let over = (voltage - c).max(0.0);
         ((b * b + 4.0 * a * over).sqrt() - b) / (2.0 * a)
     }
 
-    /// Voltage by speed without load, V·s/rad, which the voltage curve fixes for a given resistance.
+    /// Back-EMF constant, V·s/rad, which the voltage curve fixes for a given resistance.
     pub(super) fn motor_constant(&self) -> f64 {
         self.torque_coefficient / self.motor_voltage_a * self.motor_resistance
     }
 
-    /// Are these numbers a quadrotor that can be simulated?
+    /// Checks that these parameters are a quadrotor that can be simulated.
     ///
     /// # Errors
     /// [`ParameterError::Together`] with the reason.
@@ -76,6 +82,8 @@ impl PlantParameters {
         let inertia = [self.inertia_x, self.inertia_y, self.inertia_z];
         let half = 0.5 * inertia.iter().sum::<f64>();
         for (axis, moment) in ["x", "y", "z"].into_iter().zip(inertia) {
+            // The triangle inequality of principal moments, with a tolerance for flat bodies, which
+            // reach equality.
             if moment > half * (1.0 + 1e-9) {
                 return refused(format!(
                     "inertia_{axis} {moment}: no rigid body has a moment of inertia above the sum of the other two"
@@ -104,17 +112,20 @@ impl PlantParameters {
         Ok(())
     }
 
-    /// Is one step of the physics short enough for everything that springs back and everything that damps?
+    /// Checks that springs and dampers are slow enough for one step of the physics.
     fn check_step(&self, motor_constant: f64) -> Result<(), ParameterError> {
         let least = self.inertia_x.min(self.inertia_y);
         let reach = self.foot_offset.max(self.corner_offset);
-        // All four feet at once, up and down and about the axis with the least moment of inertia.
+        // Worst case: all four feet act at once, vertically and about the axis with the least
+        // moment of inertia.
         let carried = 1.0 / self.mass + reach * reach / least;
         let spring = DT * (4.0 * self.foot_stiffness * carried).sqrt();
         let damper = DT * 4.0 * self.foot_damping * carried;
         let full_speed = self.steady_speed(Battery::new(&self.battery(), 0.0).open_circuit());
         let per_volt = self.torque_coefficient / self.motor_voltage_a;
         let viscous = (self.motor_voltage_b - motor_constant) * per_volt;
+        // Damping of a rotor at full speed: electrical braking, the slope of the propeller's drag,
+        // and viscous friction.
         let braked = motor_constant * motor_constant / self.motor_resistance
             + 2.0 * self.torque_coefficient * full_speed
             + viscous;
@@ -149,7 +160,8 @@ mod tests {
     fn full_throttle_is_what_the_plant_makes_at_full_duty() {
         assert_eq!(GOOD.check(), Ok(()));
         let full = GOOD.full_throttle();
-        // A polarisation that acts at once, far above the ground.
+        // Short time constant: the polarisation acts at once. Far above the ground: no ground
+        // effect.
         let parameters = PlantParameters { battery_time_constant: 0.1, battery_capacity: 10.0, ..GOOD };
         let mut plant = Plant::new(&parameters, &WindConfig::CALM, Some(&Pose::hovering(1000.0)), 1);
         plant.set_duty([1.0; 4]);
@@ -167,7 +179,7 @@ mod tests {
         assert!(weak.full_throttle().lift < 0.4, "{:?}", weak.full_throttle());
         let reason = reason(&weak);
         assert!(reason.contains("battery_resistance 1 ohm") && reason.contains("do not spin up"), "{reason}");
-        // Two cells do, and so does anything without weight.
+        // More cells make it valid, and so does a body without weight.
         assert_eq!(PlantParameters { battery_cells: 3.0, ..weak.clone() }.check(), Ok(()));
         assert_eq!(PlantParameters { gravity: 0.0, ..weak }.check(), Ok(()));
     }

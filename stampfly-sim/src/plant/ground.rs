@@ -1,36 +1,37 @@
-//! A flat floor at world z = 0, or where the [scene](super::Scene) has it, the four feet that stand on it and the four corners that hit it in a crash.
+//! Contact with the floor: four feet, four corners, and the propellers.
 //!
-//! Each point is a spring and a damper along the vertical, and a spring to the place where it stuck with Coulomb's
-//! limit along the horizontal: a vehicle that stands, stands still instead of creeping. The floor does not pull.
+//! The floor is at world z = 0 or where the [scene](super::Scene) places it. Each contact point has
+//! a spring and a damper along the vertical, and along the horizontal a spring to its anchor,
+//! limited by Coulomb friction, so a standing vehicle does not creep. The floor does not pull.
 //!
-//! Propellers without a frame around them touch the floor, too. That stops them, and bears nothing.
+//! Unguarded propellers can touch the floor, too. Contact stops them; it carries no load.
 
 use super::{DT, PlantParameters, ROTORS, Scene};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Feet and corners, in units of their offset (x, y).
+/// Signs of feet and corners (x, y), multiplied by their offset.
 const SIDES: [(f64, f64); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
 
-/// Points that can touch: feet first, then corners.
+/// Contact points: feet first, then corners.
 const POINTS: usize = 8;
 const FEET: usize = 4;
 
-/// The floor as the vehicle feels it.
+/// Contact state of one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
-    /// Where each point stuck to the floor, world north and east; `None` in the air.
+    /// Horizontal anchor of each point, world north and east; `None` in the air.
     anchors: [Option<(f64, f64)>; POINTS],
     points: [Vector3<f64>; POINTS],
     /// Steps in which a ceiling or a wall pushed.
     strikes: u64,
     /// Steps in which a corner or a propeller touched the floor.
     scrapes: u64,
-    /// Middles of the propellers, and their radius; none that can touch with a radius of 0.
+    /// Propeller hubs and radius. A radius of 0 disables propeller contact.
     hubs: [Vector3<f64>; ROTORS],
     radius: f64,
-    /// Distance of the farthest place of a propeller from the origin.
+    /// Distance of the farthest point of a propeller from the origin.
     span: f64,
-    /// Distance of the farthest point from the origin.
+    /// Distance of the farthest contact point from the origin.
     reach: f64,
     stiffness: f64,
     damping: f64,
@@ -41,7 +42,8 @@ pub struct Ground {
 
 impl Ground {
     pub(crate) fn new(p: &PlantParameters) -> Self {
-        // The feet are so long that the origin stands at `ground_height` once the springs carry the weight.
+        // The feet are lengthened by their compression, so that the origin stands at
+        // `ground_height` under the vehicle's weight.
         let sink = p.mass * p.gravity / (4.0 * p.foot_stiffness);
         let points: [Vector3<f64>; POINTS] = core::array::from_fn(|i| {
             let (x, y) = SIDES[i % 4];
@@ -69,25 +71,25 @@ impl Ground {
         }
     }
 
-    /// Does anything touch the floor?
+    /// True while a foot or a corner touches the floor.
     #[must_use]
     pub fn contact(&self) -> bool {
         self.anchors.iter().any(Option::is_some)
     }
 
-    /// In how many steps a ceiling or a wall has pushed.
+    /// Number of steps in which a ceiling or a wall has pushed.
     #[must_use]
     pub fn strikes(&self) -> u64 {
         self.strikes
     }
 
-    /// In how many steps a corner or a propeller has touched the floor.
+    /// Number of steps in which a corner or a propeller has touched the floor.
     #[must_use]
     pub fn scrapes(&self) -> u64 {
         self.scrapes
     }
 
-    /// Which propellers touch the floor, in motor order.
+    /// Propellers that touch the floor, in motor order. Counts the scrapes.
     pub(crate) fn held(
         &mut self,
         position: &Vector3<f64>,
@@ -96,13 +98,14 @@ impl Ground {
     ) -> [bool; ROTORS] {
         let corners = self.anchors.iter().skip(FEET).any(Option::is_some);
         let is_high = scene.slope == [0.0; 2] && -position.z - scene.highest() > self.span;
+        // Shortcut for the usual case in the air.
         let is_free = self.radius <= 0.0 || is_high;
         if is_free {
             self.scrapes += u64::from(corners);
             return [false; ROTORS];
         }
         let axis = attitude * Vector3::z();
-        // From the hub to the lowest place of a tilted disc.
+        // Vector from the hub to the lowest point of the tilted disc.
         let down = Vector3::z() - axis * axis.z;
         let length = down.norm();
         let lowest = if length > 1e-6 { down * (self.radius / length) } else { Vector3::zeros() };
@@ -114,7 +117,7 @@ impl Ground {
         held
     }
 
-    /// Factor on the thrust of rotors at `height` metres above the floor.
+    /// Ground effect: factor on the thrust of rotors at `height`, m, above the floor.
     #[must_use]
     pub(crate) fn lift(&self, height: f64) -> f64 {
         if height > 8.0 * self.effect_height {
@@ -123,7 +126,7 @@ impl Ground {
         1.0 + self.effect_gain * libm::exp(-height.max(0.0) / self.effect_height)
     }
 
-    /// Force (world) and torque (body) of the floor on the vehicle.
+    /// Force (world) and torque (body) of floor, ceiling and walls on the vehicle.
     pub(crate) fn push(
         &mut self,
         position: &Vector3<f64>,
@@ -140,7 +143,7 @@ impl Ground {
                 let speed = velocity + attitude * rate.cross(point);
                 for (depth, out) in scene.inside(&place) {
                     strikes = true;
-                    // As hard as the floor, without its friction.
+                    // Stiffness and damping as for the floor, without friction.
                     let here = out * (self.stiffness * depth - self.damping * speed.dot(&out)).max(0.0);
                     force += here;
                     torque += point.cross(&attitude.inverse_transform_vector(&here));
@@ -156,12 +159,14 @@ impl Ground {
         for (point, anchor) in self.points.iter().zip(&mut self.anchors) {
             let place = position + attitude * point;
             let depth = place.z - scene.floor(&place);
+            // Losing contact also forgets the anchor: the next contact sticks where it touches.
             if depth <= 0.0 {
                 *anchor = None;
                 continue;
             }
             let speed = velocity + attitude * rate.cross(point) - Vector3::new(floor_north, floor_east, 0.0);
             let normal = (self.stiffness * (depth * -out.z) - self.damping * speed.dot(&out)).max(0.0);
+            // On a moving floor the anchor moves along.
             let stuck = anchor.get_or_insert((place.x, place.y));
             *stuck = (stuck.0 + floor_north * DT, stuck.1 + floor_east * DT);
             let (mut x, mut y) = (
@@ -170,11 +175,11 @@ impl Ground {
             );
             let (wanted, limit) = ((x * x + y * y).sqrt(), self.friction * normal);
             if wanted > limit {
-                // Slide: the anchor follows so that its spring holds just what friction allows.
+                // Sliding: the anchor follows so that its spring force equals the friction limit.
                 (x, y) = (x * limit / wanted, y * limit / wanted);
                 *stuck = (place.x + x / self.stiffness, place.y + y / self.stiffness);
             }
-            // Along the floor, and out of it.
+            // Friction acts along the inclined floor, the normal force out of it.
             let here = Vector3::new(x, y, -scene.slope[0] * x - scene.slope[1] * y) + out * normal;
             force += here;
             torque += point.cross(&attitude.inverse_transform_vector(&here));

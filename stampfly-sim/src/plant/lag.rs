@@ -1,36 +1,41 @@
-//! The lag of the collective: between the thrust that the rotors make and the force that lifts the whole vehicle.
+//! Lag of the collective: first-order delay between the rotors' mean thrust and the force that
+//! lifts the vehicle.
 //!
-//! From a thrust command to the vertical acceleration of a StampFly, its makers measured some 110 ms: "filters, PWM, motor and structure". The
-//! PWM has 150 kHz and no lag to speak of. The rotor's is in its [motor](super::motor), 16 to 20 ms by its own measurement. Filters are some of the
-//! rest, and belong to whoever measures. Nobody has told them from what the air column and the frame take, so between nothing and all of the rest is a lag
-//! of the vehicle: 20 to 110 ms with the rotor's.
+//! The manufacturer of the StampFly measured about 110 ms from thrust command to vertical
+//! acceleration: "filters, PWM, motor and structure". The PWM runs at 150 kHz and adds no
+//! noticeable delay. The rotor takes 16 to 20 ms by separate measurement and is modelled in
+//! [motor](super::motor). Filters belong to the measurement. How the remainder divides between
+//! filters, air column and frame is not known, so the lag of the vehicle is a condition: 20 to 110
+//! ms including the rotor.
 //!
-//! It is of first order and in the mean of the thrusts alone. Differences between rotors, which turn the vehicle, do not have it: turning has been identified
-//! with the rotor's lag and none beside.
+//! Only the mean of the thrusts lags. Differences between rotors, which produce torque, do not: the
+//! rotation was identified with the rotor's lag alone.
 
 use super::ROTORS;
 
-/// A lag of the rotors' mean thrust.
+/// First-order lag of the rotors' mean thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lag {
-    /// Share of the difference that is made up in one step.
+    /// Share of the remaining difference corrected per step.
     share: f64,
-    /// Mean thrust that has come about, N; `None` before the first step.
+    /// Lagged mean thrust, N; `None` before the first step.
     mean: Option<f64>,
 }
 
 impl Lag {
-    /// With this time constant, s, and this step, s; `None` without a lag.
+    /// A lag with this time constant and step, s; `None` for a time constant of 0.
     pub fn new(seconds: f64, dt: f64) -> Option<Self> {
         (seconds > 0.0).then(|| Self { share: 1.0 - libm::exp(-dt / seconds), mean: None })
     }
 
-    /// What becomes of the rotors' thrusts, N.
+    /// Delays the mean of the rotors' thrusts, N, and keeps their differences. No thrust becomes
+    /// negative.
     pub fn pass(&mut self, thrust: [f64; ROTORS]) -> [f64; ROTORS] {
         let now = thrust.iter().sum::<f64>() / ROTORS as f64;
         let before = self.mean.unwrap_or(now);
         let mean = before + (now - before) * self.share;
         self.mean = Some(mean);
+        // The same correction for all rotors leaves the torques unchanged.
         thrust.map(|thrust| (thrust + (mean - now)).max(0.0))
     }
 }

@@ -1,18 +1,20 @@
-//! Vehicles as bodies: six degrees of freedom, motors, a battery, the ground and the air.
+//! Vehicle dynamics: rigid bodies with motors, a battery, the ground and the air.
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! |---|---|
 //! | [`Plant`], [`PlantParameters`] | a quadrotor in X with brushed motors, indoors |
-//! | [`Body`], [`Airframe`] | what a [`World`](crate::World) can hold, and the numbers of which it is made |
 //! | [`Aeroplane`], [`AeroplaneParameters`] | a conventional aeroplane with one electric propeller, outdoors |
-//! | [`Battery`], [`Wind`] | of every body |
-//! | [`Scene`] | what stands around a quadrotor |
+//! | [`Body`], [`Airframe`] | interface of a body in a [`World`](crate::World), and of its parameters |
+//! | [`Battery`], [`Wind`] | models shared by all bodies |
+//! | [`Scene`] | floor, ceiling, walls and a holding hand around a quadrotor |
 //!
-//! The equations are the textbook's (Newton in the world frame, Euler in the body frame, with the rotors' angular
-//! momentum); the step is fixed at [`STEP`] and explicit, of second order for position, attitude and the gyroscopic
-//! torque and of first order for the forces, which at 1600 Hz is far below the uncertainty of every parameter.
+//! Translation follows Newton's law in the world frame, rotation Euler's equations in the body
+//! frame with the rotors' angular momentum. The step is fixed at [`STEP`] and explicit: of second
+//! order for position, attitude and gyroscopic torque, of first order for the forces. At 1600 Hz
+//! the integration error is far below the uncertainty of every parameter.
 //!
-//! Use [`Plant`] alone to study the vehicle; use [`Simulation`](crate::Simulation) to fly it.
+//! Use [`Plant`] alone to study the vehicle; use [`Simulation`](crate::Simulation) to fly it with
+//! sensors.
 
 mod aeroplane;
 mod air;
@@ -48,16 +50,16 @@ use crate::noise::{Noise, Stream};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use stampfly_types::Duration;
 
-/// Length of one physics step: 1600 of them make a second.
+/// Length of one physics step: 1/1600 s.
 pub const STEP: Duration = Duration::from_micros(625);
 
 /// [`STEP`] in seconds.
 pub(crate) const DT: f64 = 625e-6;
 
-/// Standard gravity, m/s²: of a [`Body`] that says nothing else.
+/// Standard gravity, m/s²: the default of a [`Body`].
 pub const GRAVITY: f64 = 9.806_65;
 
-/// How the vehicle is placed at the start.
+/// Initial pose and motion of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// World NED, m.
@@ -68,7 +70,7 @@ pub struct Pose {
     pub attitude: UnitQuaternion<f64>,
     /// Body FRD, rad/s.
     pub rate: Vector3<f64>,
-    /// Rotor speeds in units of hover speed: 1 for a start in the air.
+    /// Rotor speeds relative to hover speed: 1 for a start in the air.
     pub rotors: f64,
 }
 
@@ -97,19 +99,20 @@ pub struct Plant {
     battery: Battery,
     ground: Ground,
     wind: Wind,
-    /// What there is of it in these conditions.
+    /// Aerodynamic effects enabled by the conditions.
     air: Option<Air>,
     scene: Scene,
 }
 
 impl Plant {
-    /// A vehicle at `pose`; `None` stands it on the floor at the origin, facing north.
+    /// A vehicle at `pose` under neutral conditions; `None` places it on the floor at the origin,
+    /// facing north. `seed` draws its specimen and the gusts.
     #[must_use]
     pub fn new(parameters: &PlantParameters, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self {
         Self::under(parameters, &Conditions::GENTLE, wind, pose, seed)
     }
 
-    /// The same under these conditions.
+    /// As [`new`](Self::new), under these conditions.
     #[must_use]
     pub fn under(
         parameters: &PlantParameters,
@@ -151,7 +154,7 @@ impl Plant {
         self.rotors.set_duty(duty);
     }
 
-    /// Breaks or mends a rotor, in motor order from 0.
+    /// Sets the fault of a rotor; rotors count from 0 in motor order.
     pub fn set_rotor_fault(&mut self, rotor: usize, fault: RotorFault) {
         self.rotors.set_fault(rotor, fault);
     }
@@ -161,29 +164,37 @@ impl Plant {
         let p = &self.parameters;
         let m = &self.motion;
         self.wind.step();
+        // Ground effect by the height of the floor directly below, so an edge acts at once.
         let mut lift = self.ground.lift(self.scene.floor(&m.position) - m.position.z);
         if let Some(air) = &self.air {
             lift *= air.lift(m, &self.scene);
         }
         let held = self.ground.held(&m.position, &m.attitude, &self.scene);
+        // Before the rotor step, with the back-EMF of the present speeds: voltage and currents are
+        // consistent within the step.
         let voltage = self.battery.under(p.board_current, &self.rotors.loads());
         let loads = self.rotors.step(DT, voltage, lift, held);
         let current = loads.current + p.board_current;
         self.battery.step(DT, current);
 
-        // Air: rotors lose thrust and drag along with their speed, the body drags by itself.
+        // Rotors have a drag linear in airspeed and rotor speed, the body a quadratic one.
         let speed = m.rotor_speed;
+        // Mean rotor speed relative to hover.
         let share = (speed[0] + speed[1] + speed[2] + speed[3]) / (ROTORS as f64 * self.rotors.hover_speed());
+        // Height above the level floor; steps are neglected.
         let mut wind = self.wind.velocity(-m.position.z);
         if let Some(air) = &mut self.air {
             wind += air.wind(share);
         }
+        // Velocity through the air in body axes, in which the drag coefficients are given.
         let air = m.attitude.inverse_transform_vector(&(m.velocity - wind));
         let linear = Vector3::new(p.drag_horizontal, p.drag_horizontal, p.drag_vertical) * share;
         let drag = -(air.component_mul(&linear) + air * (p.drag_quadratic * air.norm()));
 
         let (mut floor_force, mut floor_torque) =
             self.ground.push(&m.position, &m.velocity, &m.attitude, &m.rate, &self.scene);
+        // The hand acts like a contact force of the floor: force in world axes, torque in body
+        // axes.
         if self.scene.hand.is_some() {
             let (force, torque) = self.scene.hold(m);
             floor_force += force;
@@ -198,17 +209,19 @@ impl Plant {
         }
         let specific_force = body_force / p.mass;
 
-        // Rolling moves the rotors up and down through the air, which damps like climbing does.
+        // Rolling and pitching move the rotors along their axes, which damps like climbing does.
         let arm = p.rotor_offset * p.rotor_offset * p.drag_vertical * share;
         let damping = Vector3::new(arm * m.rate.x, arm * m.rate.y, 0.0) + m.rate * (p.drag_rotation * m.rate.norm());
         let torque = loads.torque + floor_torque - damping;
-        // The gyroscopic torque at half the step keeps the energy of a spinning body.
+        // Evaluating the gyroscopic torque at the half step preserves the energy of a spinning
+        // body.
         let acceleration = |rate: &Vector3<f64>| {
             let momentum = self.inertia.component_mul(rate) + Vector3::new(0.0, 0.0, loads.momentum_z);
             (torque - rate.cross(&momentum)).component_div(&self.inertia)
         };
         let angular_acceleration = acceleration(&(m.rate + acceleration(&m.rate) * (0.5 * DT)));
 
+        // Forces first, then integration: `advance` reads both accelerations from the motion.
         self.motion.specific_force = specific_force;
         self.motion.angular_acceleration = angular_acceleration;
         self.motion.advance(DT, p.gravity);
@@ -216,13 +229,13 @@ impl Plant {
         self.motion.current = current;
     }
 
-    /// Where the vehicle is and how it moves.
+    /// Position, attitude and their derivatives.
     #[must_use]
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// The motors.
+    /// The motors with their propellers.
     #[must_use]
     pub fn rotors(&self) -> &Rotors {
         &self.rotors
@@ -234,37 +247,38 @@ impl Plant {
         &self.battery
     }
 
-    /// The floor.
+    /// The contact model of the floor.
     #[must_use]
     pub fn ground(&self) -> &Ground {
         &self.ground
     }
 
-    /// What stands around it.
+    /// The scene around the vehicle.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// What stands around it, to be changed.
+    /// The scene around the vehicle, for changes between two steps.
     pub fn scene_mut(&mut self) -> &mut Scene {
         &mut self.scene
     }
 
-    /// Velocity of the air at this height above the ground, with what comes back from the walls of a small room, world NED, m/s.
+    /// Velocity of the air at this height above the ground, m, including the wake recirculating in
+    /// a small room; world NED, m/s.
     #[must_use]
     pub fn air(&self, height: f64) -> Vector3<f64> {
         let wind = self.wind.velocity(height);
         self.air.as_ref().map_or(wind, |air| wind + air.returning())
     }
 
-    /// The air, as the weather moves it.
+    /// Wind and gusts, without recirculation.
     #[must_use]
     pub fn wind(&self) -> &Wind {
         &self.wind
     }
 
-    /// What the vehicle is made of.
+    /// The parameters of this specimen under its conditions.
     #[must_use]
     pub fn parameters(&self) -> &PlantParameters {
         &self.parameters
@@ -272,7 +286,7 @@ impl Plant {
 }
 
 impl Pose {
-    /// Standing on the floor at the origin with this heading (radians), motors off.
+    /// Standing on the floor at the origin with this heading, rad, motors off.
     #[must_use]
     pub fn standing(parameters: &PlantParameters, yaw: f64) -> Self {
         let (sin, cos) = libm::sincos(0.5 * yaw);
@@ -285,7 +299,7 @@ impl Pose {
         }
     }
 
-    /// Hovering at this height above the floor, metres, facing north.
+    /// Hovering at this height above the floor, m, facing north.
     #[must_use]
     pub fn hovering(height: f64) -> Self {
         Self {

@@ -1,12 +1,12 @@
-//! Position, velocity, attitude and rate, and how they go on while the forces stay as they are.
+//! Position, velocity, attitude and rate, and their integration under constant forces.
 //!
-//! Every [`Body`](super::Body) moves by these equations, of second order for position and attitude. Not for more than one
-//! [`STEP`](super::STEP) at a time.
+//! Every [`Body`](super::Body) moves by these equations, which are of second order for position and
+//! attitude. Use them for at most one [`STEP`](super::STEP) at a time.
 
 use super::{GRAVITY, ROTORS};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Where the vehicle is and how it moves.
+/// Motion of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// World NED, m. The floor is at z = 0.
@@ -17,7 +17,7 @@ pub struct Motion {
     pub attitude: UnitQuaternion<f64>,
     /// Body FRD, rad/s.
     pub rate: Vector3<f64>,
-    /// What an ideal accelerometer at the centre of mass measures, body FRD, m/s².
+    /// Specific force at the centre of mass, body FRD, m/s².
     pub specific_force: Vector3<f64>,
     /// Body FRD, rad/s².
     pub angular_acceleration: Vector3<f64>,
@@ -44,8 +44,8 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Goes on for `dt` seconds as what rolls on level ground without slipping: forward at this speed, m/s, from the one that it has now,
-    /// and turning to the right at this rate, rad/s.
+    /// Advances by `dt` seconds as a vehicle that rolls on level ground without slipping: it
+    /// reaches the forward speed `speed`, m/s, and turns right at the rate `turn`, rad/s.
     ///
     /// ```
     /// use stampfly_sim::plant::Motion;
@@ -55,7 +55,7 @@ impl Motion {
     ///     motion.roll(core::f64::consts::PI * 1e-3, 2.0, 1.0);
     /// }
     /// assert!(motion.position.x.abs() < 0.01 && (motion.position.y - 4.0).abs() < 0.01);
-    /// // Like an accelerometer that is pushed to the inside.
+    /// // The centripetal acceleration, to the right.
     /// assert!((motion.specific_force.y - 2.0).abs() < 1e-3);
     /// ```
     pub fn roll(&mut self, dt: f64, speed: f64, turn: f64) {
@@ -67,7 +67,8 @@ impl Motion {
         self.advance(dt, GRAVITY);
     }
 
-    /// The motion `dt` seconds later, for times shorter than a step: rotors and forces as they are.
+    /// The motion `dt` seconds later, for times shorter than a step, with constant specific force,
+    /// angular acceleration and rotor speeds.
     #[inline]
     #[must_use]
     pub(crate) fn after(&self, dt: f64, gravity: f64) -> Self {
@@ -76,23 +77,26 @@ impl Motion {
         later
     }
 
-    /// Goes on for `dt` seconds with the specific force and the angular acceleration as they are, under this gravity, m/s².
-    // Inlined, so that what a step has just computed need not go through memory.
+    /// Advances by `dt` seconds with constant specific force and angular acceleration under this
+    /// gravity, m/s².
+    // Inlined, so that results of the present step stay in registers.
     #[inline(always)]
     pub fn advance(&mut self, dt: f64, gravity: f64) {
         let mean_rate = self.rate + self.angular_acceleration * (0.5 * dt);
+        // Position first: it needs the velocity at the beginning of the step.
         self.position = self.position_after(dt, gravity);
         self.velocity += self.acceleration(gravity) * dt;
+        // The mean rate over the step makes the attitude second order.
         self.attitude = turn(&self.attitude, &(mean_rate * dt));
         self.rate = self.rate_after(dt);
     }
 
-    /// The position alone, as in [`after`](Self::after).
+    /// Only the position of [`after`](Self::after).
     pub(crate) fn position_after(&self, dt: f64, gravity: f64) -> Vector3<f64> {
         self.position + self.velocity * dt + self.acceleration(gravity) * (0.5 * dt * dt)
     }
 
-    /// The rate alone, as in [`after`](Self::after).
+    /// Only the rate of [`after`](Self::after).
     pub(crate) fn rate_after(&self, dt: f64) -> Vector3<f64> {
         self.rate + self.angular_acceleration * dt
     }
@@ -102,10 +106,10 @@ impl Motion {
     }
 }
 
-/// The attitude after a small turn `angle` (rotation vector, body frame).
+/// The attitude after a small rotation `angle` (rotation vector, body frame).
 ///
-/// Sine and cosine by their series up to the third order: at 2000 °/s a step turns by 0.02 rad, where what is
-/// left out is below 1e-10.
+/// Sine and cosine use their series up to the third order: at 2000 °/s a step turns by 0.02 rad,
+/// for which the truncation error is below 1e-10.
 fn turn(attitude: &UnitQuaternion<f64>, angle: &Vector3<f64>) -> UnitQuaternion<f64> {
     let square = 0.25 * angle.norm_squared();
     let vector = angle * (0.5 * (1.0 - square / 6.0));

@@ -1,18 +1,19 @@
-//! Four brushed motors with fixed propellers.
+//! Model of four brushed motors with fixed propellers.
 //!
-//! A motor turns duty and battery voltage into rotor speed; a propeller turns speed into thrust and drag torque:
+//! A motor turns duty and battery voltage into rotor speed; a propeller turns speed into thrust and
+//! drag torque:
 //!
 //! ```text
-//! current  I = (duty·Vbat − Km·ω) / Rm, never negative: the switch is one-sided and a brake needs a second one
+//! current  I = (duty·Vbat − Km·ω) / Rm, never negative: the switch is one-sided, braking needs a second one
 //! speed    J·dω/dt = Km·I − Cq·ω² − Dm·ω − Qf
 //! thrust   T = Ct·ω²
 //! ```
 //!
-//! A propeller that touches something stands: no thrust, and the current of a motor that is held.
+//! `Km`, `Dm` and `Qf` are not independent parameters: for a given resistance the measured steady
+//! voltage curve V(ω) = Am·ω² + Bm·ω + Cm fixes them (set dω/dt = 0 and compare powers of ω). The
+//! inductance of the winding is neglected, its time constant being some ten microseconds.
 //!
-//! `Km`, `Dm` and `Qf` are not parameters of their own: the steady voltage curve V(ω) = Am·ω² + Bm·ω + Cm that was
-//! measured fixes them for a given resistance (set dω/dt = 0 and compare powers of ω). The winding's inductance
-//! is left out, its time constant being some ten microseconds.
+//! A propeller that touches an obstacle stops: no thrust, and the stall current of its motor.
 
 use super::battery::Load;
 use super::lag::Lag;
@@ -25,40 +26,41 @@ use stampfly_types::GRAVITY;
 /// Number of rotors.
 pub const ROTORS: usize = 4;
 
-/// Where the rotors sit, in units of the rotor offset: front right, rear right, rear left, front left (x, y).
+/// Rotor positions (x, y) in units of the rotor offset: front right, rear right, rear left, front
+/// left.
 pub(super) const PLACES: [(f64, f64); ROTORS] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
 
-/// Which way they turn about the body's z axis (down): −1 is counter-clockwise seen from above.
+/// Direction of rotation about the body's z axis (down): −1 is counter-clockwise seen from above.
 const SPINS: [f64; ROTORS] = [-1.0, 1.0, -1.0, 1.0];
 
-/// Time constant with which a propeller that touches something stops, s: a turn of one of five
-/// inches takes 6 ms at hover.
+/// Time constant with which a propeller that touches an obstacle stops, s. One turn of a five-inch
+/// propeller takes 6 ms at hover.
 const STOPS: f64 = 0.002;
 
-/// What the rotors do to the body in one step.
+/// Action of the rotors on the body in one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RotorLoads {
-    /// Sum of thrusts, newtons, along −z of the body.
+    /// Sum of thrusts, N, along −z of the body.
     pub thrust: f64,
-    /// Torque about the body's axes, gyroscopic part not included.
+    /// Torque about the body's axes without the gyroscopic part, N·m.
     pub torque: Vector3<f64>,
-    /// Angular momentum of the rotors along body z.
+    /// Angular momentum of the rotors along body z, N·m·s.
     pub momentum_z: f64,
-    /// Current out of the battery.
+    /// Current drawn from the battery, A.
     pub current: f64,
 }
 
-/// What is wrong with one rotor.
+/// Fault of one rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFault {
-    /// Share of its thrust that the propeller still has, at the same speed and with the same drag.
+    /// Remaining share of the propeller's thrust, at the same speed and with the same drag.
     pub thrust: f64,
-    /// The duty it has whatever is commanded, 0 to 1: a transistor that does not switch.
+    /// Duty, 0 to 1, that replaces the command: a transistor that does not switch.
     pub duty: Option<f64>,
 }
 
 impl RotorFault {
-    /// Nothing.
+    /// No fault.
     pub const NONE: Self = Self { thrust: 1.0, duty: None };
 }
 
@@ -67,7 +69,7 @@ impl RotorFault {
 pub struct Rotors {
     duty: [f64; ROTORS],
     speed: [f64; ROTORS],
-    /// Of healthy propellers.
+    /// Thrust coefficients without faults.
     thrust_coefficient: [f64; ROTORS],
     torque_coefficient: f64,
     resistance: [f64; ROTORS],
@@ -76,18 +78,19 @@ pub struct Rotors {
     friction: f64,
     inertia: f64,
     faults: [RotorFault; ROTORS],
-    /// Rotor places relative to the centre of mass.
+    /// Rotor positions relative to the centre of mass, m.
     places: [(f64, f64); ROTORS],
     lag: Option<Lag>,
     hover_speed: f64,
 }
 
 impl Rotors {
-    /// Rotors at rest. Their differences are the seed's.
+    /// Rotors at rest. `seed` draws the differences between them.
     pub(crate) fn new(parameters: &PlantParameters, conditions: &Conditions, seed: u64) -> Self {
         let noise = &mut Noise::stream(seed, Stream::Airframe);
         let p = parameters;
         let spread = p.manufacturing_spread;
+        // Normal draws are truncated, so that no specimen is absurd.
         let limit = conditions.spread_limit;
         let per_volt = p.torque_coefficient / p.motor_voltage_a;
         let motor_constant = p.motor_constant();
@@ -96,6 +99,7 @@ impl Rotors {
         });
         let across = conditions.centre_spread * spread;
         let differs = within(limit * across, [across * noise.normal(), across * noise.normal()]);
+        // Design offset plus the specimen's.
         let centre = [p.centre_x + differs[0], p.centre_y + differs[1]];
         let motors = &mut Noise::stream(seed, Stream::RotorSpecimen);
         let mut differing = |mean: f64| {
@@ -130,7 +134,7 @@ impl Rotors {
         self.duty = duty;
     }
 
-    /// Breaks or mends a rotor; one that does not exist is ignored.
+    /// Sets the fault of a rotor; a rotor that does not exist is ignored.
     pub(crate) fn set_fault(&mut self, rotor: usize, fault: RotorFault) {
         if let Some(place) = self.faults.get_mut(rotor) {
             *place = fault;
@@ -148,55 +152,59 @@ impl Rotors {
         self.duty
     }
 
-    /// Rotor speeds, rad/s, always positive.
+    /// Rotor speeds, rad/s, never negative.
     #[must_use]
     pub fn speed(&self) -> [f64; ROTORS] {
         self.speed
     }
 
-    /// The speed at which ideal rotors carry the vehicle on Earth, rad/s.
+    /// Speed at which rotors without spread carry the vehicle on Earth, rad/s.
     #[must_use]
     pub fn hover_speed(&self) -> f64 {
         self.hover_speed
     }
 
-    /// The duty cycles that the motors have, whatever is commanded.
+    /// Effective duty cycles: a stuck transistor overrides its command.
     fn switched(&self) -> [f64; ROTORS] {
         core::array::from_fn(|i| self.faults[i].duty.unwrap_or(self.duty[i]))
     }
 
-    /// What the motors are for the battery now.
+    /// The motors as loads of the battery at their present speeds.
     pub(crate) fn loads(&self) -> [Load; ROTORS] {
         let duty = self.switched();
         core::array::from_fn(|i| Load::of_motor(duty[i], self.resistance[i], self.motor_constant[i] * self.speed[i]))
     }
 
-    /// One step of `dt` seconds on `voltage`, with the thrust multiplied by `lift`. `held`: whose
-    /// propeller touches something.
+    /// Advances by `dt` seconds at `voltage`, with the thrust multiplied by `lift`. `held` marks
+    /// propellers that touch an obstacle.
     pub(crate) fn step(&mut self, dt: f64, voltage: f64, lift: f64, held: [bool; ROTORS]) -> RotorLoads {
-        // Each line for all rotors, so that they are computed side by side.
+        // Each line handles all rotors, so that the compiler can vectorise it.
         let duty = self.switched();
         let speed = self.speed;
         let current: [f64; ROTORS] = core::array::from_fn(|i| {
             ((duty[i] * voltage - self.motor_constant[i] * speed[i]) / self.resistance[i]).max(0.0)
         });
         let drag = speed.map(|speed| self.torque_coefficient * speed * speed);
+        // Limited at zero: friction stops a rotor and does not turn it backwards.
         self.speed = core::array::from_fn(|i| {
             let net = self.motor_constant[i] * current[i] - drag[i] - self.viscous * speed[i] - self.friction;
             (speed[i] + net / self.inertia * dt).max(0.0)
         });
+        // The airframe feels the opposite of what accelerates the rotor and of the propeller's
+        // drag.
         let mut reaction: [f64; ROTORS] = core::array::from_fn(|i| {
             let acceleration = (self.speed[i] - speed[i]) / dt;
             -SPINS[i] * (drag[i] + self.inertia * acceleration)
         });
         let mut thrust: [f64; ROTORS] =
             core::array::from_fn(|i| self.thrust_coefficient[i] * self.faults[i].thrust * speed[i] * speed[i] * lift);
+        // The lag acts on the thrust after faults, before contact removes single rotors.
         thrust = match &mut self.lag {
             Some(lag) => lag.pass(thrust),
             None => thrust,
         };
         for i in (0..ROTORS).filter(|i| held[*i]) {
-            // What stops it pushes outside of the body, which feels the motor alone.
+            // The obstacle takes up the braking torque; the body receives the motor's torque only.
             self.speed[i] = speed[i] * (1.0 - dt / STOPS).max(0.0);
             (thrust[i], reaction[i]) = (0.0, -SPINS[i] * self.motor_constant[i] * current[i]);
         }
@@ -212,7 +220,7 @@ impl Rotors {
     }
 }
 
-/// A point in the plane, brought back onto a circle around the origin if it is outside.
+/// Limits a point in the plane to a circle around the origin.
 fn within(radius: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let far = (x * x + y * y).sqrt();
     if far > radius { [x, y].map(|part| part * (radius / far)) } else { [x, y] }
@@ -280,7 +288,8 @@ mod tests {
             let across = rotors.places[0].1 - rotors.places[1].1;
             aside += across * across / count as f64;
         }
-        // Both act against each other: a strong magnet needs less current and makes more voltage.
+        // A stronger magnet needs less current for the same torque but has more back-EMF; the
+        // effects partly cancel.
         assert!((0.01..0.04).contains(&square.sqrt()), "{}", square.sqrt());
         assert!((aside.sqrt() / (0.0005 * 2f64.sqrt()) - 1.0).abs() < 0.15, "{} m", aside.sqrt());
     }
@@ -297,7 +306,7 @@ mod tests {
         assert!((0.1..0.125).contains(&lag), "the rotors' 20 ms and 90: {lag} s");
     }
 
-    /// The steady voltage at a speed.
+    /// Steady voltage at a speed.
     fn curve(w: f64) -> f64 {
         IDEAL.motor_voltage_a * w * w + IDEAL.motor_voltage_b * w + IDEAL.motor_voltage_c
     }
@@ -332,7 +341,8 @@ mod tests {
             let loads = settle(&mut rotors, battery);
             assert!((loads.thrust / (IDEAL.mass * IDEAL.gravity) - 1.0).abs() < 2e-3, "{}", loads.thrust);
             assert!(loads.torque.norm() < 1e-9 && loads.momentum_z.abs() < 1e-9, "balanced");
-            // Torque over the motor's constant, which the curve fixes, times the share of the time that the switch is closed.
+            // Torque divided by the motor constant, times the share of time for which the switch
+            // conducts.
             let per_volt = IDEAL.torque_coefficient / IDEAL.motor_voltage_a;
             let each = (curve(w) - per_volt * IDEAL.motor_resistance * w) / IDEAL.motor_resistance;
             assert!((loads.current / (4.0 * duty * each) - 1.0).abs() < 2e-3, "{} A", loads.current);
@@ -358,7 +368,8 @@ mod tests {
 
     #[test]
     fn each_motor_pushes_the_body_the_way_the_mixer_expects() {
-        // Roll, pitch, yaw signs: front right (-,+,+), rear right (-,-,-), rear left (+,-,+), front left (+,+,-).
+        // Roll, pitch, yaw signs: front right (-,+,+), rear right (-,-,-), rear left (+,-,+), front
+        // left (+,+,-).
         let signs = [(-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0)];
         for (motor, (roll, pitch, yaw)) in signs.into_iter().enumerate() {
             let mut rotors = ideal();
@@ -380,10 +391,10 @@ mod tests {
         let [first, others @ ..] = rotors.speed();
         assert!(first < 0.01 * others[0], "{:?}", rotors.speed());
         assert!((after.thrust / before.thrust - 0.75).abs() < 1e-3 && after.torque.x > 1e-3, "{after:?}");
-        // Duty times what it drives through the winding.
+        // Duty times the winding current.
         let stall = 0.6 * 0.6 * 4.0 / IDEAL.motor_resistance;
         assert!((after.current - (0.75 * before.current + stall)).abs() < 0.02 * stall, "{after:?}");
-        // Let go, it turns again.
+        // Released, it turns again.
         assert!((settle(&mut rotors, 4.0).thrust / before.thrust - 1.0).abs() < 1e-3);
     }
 

@@ -1,8 +1,9 @@
-//! What stands around the vehicle, and how the floor is: a slope, an edge, a ceiling, a wall, a hand.
+//! Obstacles around a quadrotor and the shape of the floor: slope, edge, ceiling, wall, holding
+//! hand.
 //!
-//! Nothing by default. For faults in flight: whoever changes the scene does it between two steps, relative to where the
-//! vehicle is. Range finder and flow sensor see the edge and the floor's motion; nothing sees walls, ceilings and hands, as on
-//! the vehicle, whose range finder looks down.
+//! Empty by default. Conditions and faults change the scene between two steps, relative to the
+//! vehicle's position. Range finder and flow sensor see edges and the motion of the floor. No
+//! sensor sees walls, ceilings or hands, because the vehicle's range finder points down.
 
 use super::Motion;
 use crate::conditions::Conditions;
@@ -13,29 +14,30 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 pub struct Beyond {
     /// A point of the line, world north and east, m.
     pub point: [f64; 2],
-    /// Where beyond is, a unit vector, world north and east.
+    /// Unit vector into the half space, world north and east.
     pub ahead: [f64; 2],
 }
 
 impl Beyond {
-    /// The half space that begins `distance` metres ahead of the vehicle on its way; ahead of its nose when it stands.
+    /// The half space that begins `distance` metres ahead in the direction of travel, or ahead of
+    /// the nose below 0.1 m/s.
     #[must_use]
     pub fn ahead_of(motion: &Motion, distance: f64) -> Self {
         let nose = motion.attitude * Vector3::x();
-        // Slower than this it has no way.
+        // Below this speed the direction of travel is undefined.
         let way = if motion.velocity.xy().norm() > 0.1 { motion.velocity } else { nose };
         let length = way.xy().norm().max(1e-6);
         let ahead = [way.x / length, way.y / length];
         Self { point: [motion.position.x + distance * ahead[0], motion.position.y + distance * ahead[1]], ahead }
     }
 
-    /// How far a place is inside, m; negative outside.
+    /// Depth of a point inside the half space, m; negative outside.
     pub(super) fn depth(&self, place: &Vector3<f64>) -> f64 {
         (place.x - self.point[0]) * self.ahead[0] + (place.y - self.point[1]) * self.ahead[1]
     }
 }
 
-/// A hand that holds the vehicle where it is.
+/// A hand that holds the vehicle at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
     /// World NED, m.
@@ -45,10 +47,10 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// A hand that holds the vehicle at a place, world NED, m, turned by roll, pitch and yaw, rad.
+    /// A hand at this position, world NED, m, with this roll, pitch and yaw, rad.
     #[must_use]
     pub fn new(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Self {
-        // Not by nalgebra's function, whose sine is the machine's.
+        // Not nalgebra's constructor, whose sine depends on the platform.
         let about = |axis: Vector3<f64>, angle: f64| {
             let (sin, cos) = libm::sincos(0.5 * angle);
             UnitQuaternion::new_normalize(Quaternion::from_parts(cos, axis * sin))
@@ -57,10 +59,12 @@ impl Hand {
         Self { position: position.into(), attitude }
     }
 
-    /// The hand on its way from here to there, at this share of it, 0 to 1: it starts and ends gently.
+    /// Pose on the way from this hand to `there`, at the share `share`, 0 to 1, with smooth start
+    /// and end.
     #[must_use]
     pub fn toward(&self, there: &Self, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
+        // Smoothstep: zero velocity at both ends.
         let share = share * share * (3.0 - 2.0 * share);
         let turn = (self.attitude.inverse() * there.attitude).scaled_axis() * share;
         let angle = turn.norm();
@@ -72,21 +76,23 @@ impl Hand {
     }
 }
 
-/// Spring and damper of an arm's muscles: 60 N/m for some tens of grams lets it give way by some millimetres.
+/// Spring, N/m, and damper, N·s/m, of an arm: 60 N/m give way by some millimetres under tens of
+/// grams.
 const ARM: [f64; 2] = [60.0, 1.5];
-/// The same about the fingers, N·m/rad and N·m·s/rad.
+/// Spring, N·m/rad, and damper, N·m·s/rad, of the wrist.
 const WRIST: [f64; 2] = [0.02, 3.0e-4];
 
-/// The surroundings. The default is a flat floor at rest and nothing else.
+/// The surroundings. The default is a flat floor at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// Where the floor is lower (or higher, when negative), and by how much, m.
+    /// Half space in which the floor is lower (higher if negative), and the drop, m.
     pub edge: Option<(Beyond, f64)>,
-    /// The floor rises towards north and east by this, m/m. Put there under a vehicle that stands, it is a jolt.
+    /// Rise of the floor towards north and east, m/m. Changing it under a standing vehicle causes a
+    /// jolt.
     pub slope: [f64; 2],
-    /// Where the slope is as high as the level floor, world north and east, m.
+    /// Point at which the slope crosses the level floor, world north and east, m.
     pub pivot: [f64; 2],
-    /// The floor's velocity, world north and east, m/s.
+    /// Velocity of the floor, world north and east, m/s.
     pub floor_velocity: [f64; 2],
     /// Height of a ceiling, m.
     pub ceiling: Option<f64>,
@@ -96,11 +102,12 @@ pub struct Scene {
     pub hand: Option<Hand>,
 }
 
-/// A place this far below the upper one of two floors is on the lower one, m: deeper than anything presses into a floor.
+/// Depth below the upper of two floors from which a point belongs to the lower one, m: more than
+/// any contact compresses the floor.
 const OVERHANG: f64 = 0.05;
 
 impl Scene {
-    /// A flat floor at rest and nothing else, as by default.
+    /// A flat floor at rest, as by default.
     pub const LEVEL: Self = Self {
         edge: None,
         slope: [0.0; 2],
@@ -111,7 +118,7 @@ impl Scene {
         hand: None,
     };
 
-    /// What stands around under these conditions.
+    /// The scene given by these conditions: floor step, moving floor, ceiling.
     #[must_use]
     pub fn under(conditions: &Conditions) -> Self {
         let Conditions { ceiling, floor_step: step, floor_step_distance: distance, .. } = *conditions;
@@ -125,15 +132,16 @@ impl Scene {
         }
     }
 
-    /// The floor's z at a place, world NED, m.
+    /// z of the floor at a position, world NED, m.
     #[must_use]
     pub fn floor(&self, place: &Vector3<f64>) -> f64 {
         let level = match &self.edge {
             Some((beyond, drop)) => {
                 let inside = beyond.depth(place);
                 let (here, there) = if inside > 0.0 { (*drop, 0.0) } else { (0.0, *drop) };
-                // What is under the upper floor already is not thrown up through it, and what is deeper below it than behind
-                // its face is at the face, which pushes it out.
+                // A point below the upper floor must not be thrown up through it. A point deeper
+                // below that floor than behind its face is treated as touching the face, which
+                // pushes it out sideways.
                 if place.z > here + OVERHANG.min(inside.abs()) { here.max(there) } else { here }
             }
             None => 0.0,
@@ -141,54 +149,62 @@ impl Scene {
         level - self.slope[0] * (place.x - self.pivot[0]) - self.slope[1] * (place.y - self.pivot[1])
     }
 
-    /// Distance from a place to the floor along a unit vector that points down, m.
+    /// Distance from a position to the floor along a unit vector that points down, m.
     #[must_use]
     pub fn distance(&self, place: &Vector3<f64>, beam: &Vector3<f64>) -> f64 {
+        // On a slope an edge counts only directly below the sensor; the beam meets the plane of
+        // that floor.
         if self.slope != [0.0; 2] {
             let steepness = beam.z + self.slope[0] * beam.x + self.slope[1] * beam.y;
             return (self.floor(place) - place.z) / steepness.max(1e-3);
         }
         let meets = |level: f64| (level - place.z) / beam.z;
         let Some((beyond, drop)) = &self.edge else { return meets(0.0) };
+        // z points down, so the upper floor has the smaller z.
         let (upper, lower) = (drop.min(0.0), drop.max(0.0));
-        // A beam that passes over an edge meets the lower floor, and so does one from under the
-        // upper one.
+        // A beam that passes over an edge meets the lower floor, and so does a beam that starts
+        // below the upper floor.
         let is_beyond = beyond.depth(&(place + beam * meets(upper))) > 0.0;
         let on_upper = is_beyond == (*drop < 0.0) && place.z <= upper + OVERHANG;
         meets(if on_upper { upper } else { lower })
     }
 
-    /// The floor's normal, up, world NED.
+    /// Upward normal of the floor, world NED.
     pub(super) fn normal(&self) -> Vector3<f64> {
         let [north, east] = self.slope;
         Vector3::new(-north, -east, -1.0) / (1.0 + north * north + east * east).sqrt()
     }
 
-    /// How deep a place is in the ceiling or the wall, with the direction out of it.
+    /// Penetration depths of a point into ceiling, wall and the face of an edge, each with the
+    /// outward direction.
     pub(super) fn inside(&self, place: &Vector3<f64>) -> impl Iterator<Item = (f64, Vector3<f64>)> {
         let ceiling = self.ceiling.map(|height| (-place.z - height, Vector3::new(0.0, 0.0, 1.0)));
         let wall = self.wall.map(|wall| (wall.depth(place), Vector3::new(-wall.ahead[0], -wall.ahead[1], 0.0)));
         let face = self.edge.and_then(|(beyond, drop)| {
-            // The upper floor's face looks ahead where the floor is lower there.
+            // The face of the upper floor points towards the lower one.
             let (inside, out) = if drop > 0.0 { (-beyond.depth(place), 1.0) } else { (beyond.depth(place), -1.0) };
             let below = place.z - drop.min(0.0);
+            // A point nearer to the top than to the face is carried by the upper floor instead of
+            // being pushed by the face.
             let strikes = below > inside && self.floor(place) > drop.min(0.0);
             strikes.then_some((inside, Vector3::new(out * beyond.ahead[0], out * beyond.ahead[1], 0.0)))
         });
         [ceiling, wall, face].into_iter().flatten().filter(|(depth, _)| *depth > 0.0)
     }
 
-    /// Height of the highest floor where nothing slopes, m.
+    /// Height of the highest floor without slope, m.
     pub(super) fn highest(&self) -> f64 {
         self.edge.map_or(0.0, |(_, drop)| (-drop).max(0.0))
     }
 
-    /// Can something beside the floor push a vehicle here, none of whose points is farther from its place than `reach`?
+    /// True if a ceiling, a wall or a face can touch a vehicle here whose points are within `reach`
+    /// of its origin.
     pub(super) fn may_strike(&self, place: &Vector3<f64>, reach: f64) -> bool {
         let (ceiling, wall) = (self.ceiling, self.wall);
         let under = ceiling.is_some_and(|height| -place.z + reach > height);
         let beside = wall.is_some_and(|wall| wall.depth(place) + reach > 0.0);
-        // The face of an edge pushes only where one of the other two is: flights that are on record depend on it.
+        // The face of an edge acts only together with a ceiling or a wall: recorded flights depend
+        // on this.
         let face = self.edge.is_some() && (ceiling.is_some() || wall.is_some());
         under || beside || face
     }
@@ -213,7 +229,7 @@ mod tests {
         Plant::new(&parameters, &WindConfig::CALM, Some(&pose), 1)
     }
 
-    /// It used to be thrown up by a floor that it was half a metre under.
+    /// Regression: a floor half a metre above the vehicle used to throw it up.
     #[test]
     fn what_drifts_back_under_an_edge_stays_below() {
         for (drop, upper) in [(0.7, Vector3::new(-0.01, 0.0, 0.0)), (-0.7, Vector3::new(0.01, 0.0, -0.7))] {
@@ -228,7 +244,7 @@ mod tests {
     #[test]
     fn the_face_of_an_edge_pushes_out_and_its_top_carries() {
         let ahead = Beyond { point: [0.0, 0.0], ahead: [1.0, 0.0] };
-        // The lower floor lies ahead, and behind.
+        // The lower floor is ahead, then behind.
         for (drop, upper, out) in [(0.7, 0.0, 1.0), (-0.7, -0.7, -1.0)] {
             let scene = Scene { edge: Some((ahead, drop)), ..Scene::default() };
             let struck = Vector3::new(-0.01 * out, 0.0, upper + 0.03);
@@ -240,7 +256,7 @@ mod tests {
         }
     }
 
-    /// From a metre above the level floor, and leaning by 0.5 to either side.
+    /// From a metre above the level floor, vertically and inclined by 0.5 to either side.
     #[test]
     fn a_beam_ends_on_the_first_floor_that_it_meets() {
         let lean = |x: f64| Vector3::new(x, 0.0, 1.0).normalize();
@@ -250,8 +266,8 @@ mod tests {
             let down = |x: f64, beam: Vector3<f64>| scene.distance(&Vector3::new(x, 0.0, -1.0), &beam) * beam.z;
             let [here, there] = [down(-2.0, lean(0.0)), down(2.0, lean(0.0))];
             assert!((here - 1.0).abs() < 1e-9 && (there - 1.0 - drop).abs() < 1e-9, "{drop} m: {here}, {there}");
-            // One that leans, just beyond the edge where it has come down to the upper floor, and
-            // just before it. The face of a step is not seen.
+            // Inclined beams that reach the height of the upper floor just beyond the edge and just
+            // before it. The face of a step is not seen.
             let upper = 1.0 + drop.min(0.0);
             let [beyond, before] = [0.01, -0.01].map(|past| down(past - 0.5 * upper, lean(0.5)));
             assert!((beyond - 1.0 - drop).abs() < 1e-9 && (before - 1.0).abs() < 1e-9, "{drop} m: {beyond}, {before}");
@@ -346,7 +362,7 @@ mod tests {
         let at = |north: f64, east: f64| scene.floor(&Vector3::new(north, east, -1.0));
         assert_eq!([at(0.0, 0.4), at(2.0, 0.4), at(0.0, 0.6), at(-2.0, 0.6)], [0.0, 0.0, -0.2, -0.2]);
         assert_eq!((scene.ceiling, scene.floor_velocity), (Some(2.4), [0.1, 0.0]));
-        // A vehicle that comes down on the step stands on it, and goes north with it.
+        // A vehicle that descends onto the step stands on it and moves north with it.
         let parameters = PlantParameters { manufacturing_spread: 0.0, ..PlantParameters::EXAMPLE };
         let pose = Pose { rotors: 0.0, position: Vector3::new(0.0, 0.8, -0.3), ..Pose::hovering(0.3) };
         let mut plant = Plant::under(&parameters, &conditions, &WindConfig::CALM, Some(&pose), 1);

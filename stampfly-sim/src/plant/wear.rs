@@ -1,31 +1,32 @@
-//! What age and cold do to a lithium battery.
+//! Effects of age and temperature on a lithium battery.
 //!
-//! A cell has reached the end of its life, by the usual definition, with 80 % of its capacity or with twice the resistance of a new one. Both
-//! are taken to come evenly and together.
+//! By the usual definition a cell is at the end of its life at 80 % of its capacity or at twice the
+//! resistance of a new one. Both are assumed to progress linearly and together.
 //!
-//! The resistance of a cell follows Arrhenius' law, because what takes part in it does: conduction of the electrolyte and transfer at the
-//! electrodes. Its activation energy is some 20 kJ/mol over the temperatures at which one flies (17 to 35 kJ/mol for the parts: Chen et al. 2020,
-//! J. Electrochem. Soc. 167 080534; Marquis et al. 2019, 166 A3693): twice as much at 0 °C as at 25 °C, and four times at −20 °C, where cells are
-//! found to have three to five times.
+//! The resistance follows Arrhenius' law, as do conduction of the electrolyte and charge transfer
+//! at the electrodes. The activation energy is about 20 kJ/mol at flight temperatures (17 to 35
+//! kJ/mol for the parts: Chen et al. 2020, J. Electrochem. Soc. 167 080534; Marquis et al. 2019,
+//! 166 A3693): twice the resistance at 0 °C as at 25 °C, and four times at −20 °C, where three to
+//! five times are measured.
 //!
-//! Left out: that a battery warms by its own current, that a cold one gives less charge before it is empty, and the slow change of the
-//! open-circuit voltage.
+//! Neglected: self-heating by the current, the lower usable capacity of a cold battery, and ageing
+//! of the open-circuit voltage.
 
 use super::BatterySpec;
 
-/// Share by which the resistance has grown at the end of life.
+/// Relative growth of the resistance up to the end of life.
 const GROWTH: f64 = 1.0;
-/// Share of the capacity that is lost at the end of life.
+/// Relative loss of capacity up to the end of life.
 const LOSS: f64 = 0.2;
 /// Activation energy over the gas constant, K: 20 kJ/mol.
 const ACTIVATION: f64 = 20_000.0 / 8.314_46;
 /// Temperature at which resistances are given, °C.
 const REFERENCE: f64 = 25.0;
-/// Of the ice point, K.
+/// 0 °C in K.
 const ZERO: f64 = 273.15;
 
 impl BatterySpec {
-    /// The same battery after so much wear: 0 is new, 1 the end of its life.
+    /// The same battery after ageing: 0 is new, 1 the end of its life.
     #[must_use]
     pub fn worn(self, age: f64) -> Self {
         let growth = 1.0 + GROWTH * age;

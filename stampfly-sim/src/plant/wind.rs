@@ -1,28 +1,30 @@
-//! Moving air: a constant wind plus gusts.
+//! Wind: a constant mean plus gusts.
 //!
-//! Gusts are a first-order Gauss-Markov process per world axis, the simplest relative of Dryden's spectra: right in
-//! strength and duration, wrong in the finer shape of the spectrum, which a vehicle of this size cannot tell.
+//! Gusts are a first-order Gauss-Markov process per world axis, the simplest approximation of
+//! Dryden's spectra: correct in intensity and correlation time, inexact in the shape of the
+//! spectrum, to which a vehicle of this size is insensitive.
 
 use crate::noise::Noise;
 use crate::normals::Normals;
 use nalgebra::Vector3;
 use stampfly_types::Vec3;
 
-/// How the wind grows with the height above the ground.
+/// Dependence of the wind on the height above the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WindProfile {
-    /// Air that a room's floor holds back: half of the wind is left at 0.3 m, a tenth at a foot's height.
+    /// Indoors: half of the wind remains at 0.3 m, a tenth at 3 cm.
     Room,
-    /// The logarithmic law over open ground (WMO, Guide to Instruments and Methods of Observation, part I, 5): the wind is the one that
-    /// was asked for at 10 m. For heights up to some 100 m.
+    /// Logarithmic law over open ground (WMO, Guide to Instruments and Methods of Observation, part
+    /// I, 5), equal to the configured wind at 10 m. For heights up to about 100 m.
     Open {
-        /// Roughness length, m: 0.005 over snow or tarmac, 0.03 over short grass, 0.1 over low crops (Davenport's classification).
+        /// Roughness length, m: 0.005 over snow or tarmac, 0.03 over short grass, 0.1 over low
+        /// crops (Davenport's classification).
         roughness: f64,
     },
 }
 
 impl WindProfile {
-    /// Share of the wind at `height` metres.
+    /// Share of the wind at `height`, m.
     fn share(self, height: f64) -> f64 {
         let height = height.max(0.0);
         match self {
@@ -35,21 +37,22 @@ impl WindProfile {
     }
 }
 
-/// How the air moves.
+/// Mean wind and gusts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindConfig {
-    /// Constant part where the [profile](Self::profile) has its full strength, world NED, m/s: where the air goes to.
+    /// Mean wind at full strength of the [profile](Self::profile), world NED, m/s; the direction
+    /// the air moves to.
     pub mean: Vec3,
-    /// Standard deviation of the gusts along north and east, m/s; down has half of it.
+    /// Standard deviation of the gusts along north and east, m/s; half of it along down.
     pub gust: f32,
     /// Correlation time of the gusts, s.
     pub correlation: f32,
-    /// What the ground does to all of it.
+    /// Profile applied to mean wind and gusts.
     pub profile: WindProfile,
 }
 
 impl Default for WindConfig {
-    /// A room with people in it: no constant wind, gusts of 0.5 m/s lasting about 1.5 s.
+    /// An occupied room: no mean wind, gusts of 0.5 m/s with a correlation time of 1.5 s.
     fn default() -> Self {
         Self { mean: Vec3::zeros(), gust: 0.5, correlation: 1.5, profile: WindProfile::Room }
     }
@@ -60,8 +63,8 @@ impl WindConfig {
     pub const CALM: Self =
         Self { mean: Vec3::new(0.0, 0.0, 0.0), gust: 0.0, correlation: 1.5, profile: WindProfile::Room };
 
-    /// A calm summer day over short grass: gusts of 0.5 m/s. They last 5 s, so that they are some 75 m long at 15 m/s (MIL-F-8785C has 50
-    /// to 200 m near the ground).
+    /// A calm summer day over short grass: gusts of 0.5 m/s with a correlation time of 5 s, which
+    /// is 75 m at 15 m/s (MIL-F-8785C has 50 to 200 m near the ground).
     pub const MEADOW: Self = Self {
         mean: Vec3::new(0.0, 0.0, 0.0),
         gust: 0.5,
@@ -70,10 +73,10 @@ impl WindConfig {
     };
 }
 
-/// Physics steps between two steps of the gusts: they are slow.
+/// Physics steps per step of the gusts, which change slowly.
 const DECIMATION: u32 = 4;
 
-/// Height at which half of the wind is left, m.
+/// Height at which half of the wind remains, m.
 const BOUNDARY_LAYER: f64 = 0.3;
 
 /// The air at the vehicle.
@@ -89,12 +92,14 @@ pub struct Wind {
 }
 
 impl Wind {
-    /// `dt` is the length of one physics step, seconds.
+    /// Wind with this configuration; `dt` is the length of one physics step, s.
     pub(crate) fn new(config: &WindConfig, dt: f64, mut noise: Noise) -> Self {
         let deviation = f64::from(config.gust) * Vector3::new(1.0, 1.0, 0.5);
+        // Exact discretisation of the first-order process at the decimated rate.
         let keep = libm::exp(-dt * f64::from(DECIMATION) / f64::from(config.correlation).max(1e-3));
+        // Drawn from the stationary distribution, so that there is no transient at the start.
         let gust = deviation.component_mul(&noise.normal3());
-        // This drive keeps the variance where it starts.
+        // This drive keeps the variance stationary.
         let drive = deviation * (1.0 - keep * keep).sqrt();
         Self {
             noise: noise.into(),
@@ -111,13 +116,14 @@ impl Wind {
         self.countdown -= 1;
         if self.countdown == 0 {
             self.countdown = DECIMATION;
+            // Calm air draws no random numbers.
             if self.drive.x > 0.0 {
                 self.gust = self.gust * self.keep + self.drive.component_mul(&Vector3::from(self.noise.next()));
             }
         }
     }
 
-    /// Velocity of the air at `height` metres above the ground, which holds it back, world NED, m/s.
+    /// Velocity of the air at `height`, m, above the ground, world NED, m/s.
     #[must_use]
     pub fn velocity(&self, height: f64) -> Vector3<f64> {
         (self.mean + self.gust) * self.profile.share(height)

@@ -1,4 +1,4 @@
-//! What the vehicle does to its surroundings, and what people do to it: motors, lights, button.
+//! Models of motor outputs, lights and buzzer, and the button.
 
 use crate::plant::ROTORS;
 use crate::time::Clock;
@@ -13,7 +13,8 @@ use std::rc::Rc;
 /// Steps of the pulse-width modulation: 8 bits at 150 kHz.
 const PWM_STEPS: f64 = 255.0;
 
-/// The motors' power stage. Implements [`MotorOutputs`].
+/// Power stage of the motors. Implements [`MotorOutputs`]. Unarmed outputs and values that are not
+/// finite stop the motor.
 #[derive(Clone, Debug)]
 pub struct MotorModel {
     world: World,
@@ -33,6 +34,7 @@ impl MotorOutputs for MotorModel {
         let mut duty = [0.0; ROTORS];
         for (duty, wanted) in duty.iter_mut().zip(output.duty) {
             if output.armed && wanted.is_finite() {
+                // Rounded to the resolution of the pulse-width modulation.
                 *duty = (f64::from(wanted.clamp(0.0, 1.0)) * PWM_STEPS).round() / PWM_STEPS;
             }
         }
@@ -41,7 +43,7 @@ impl MotorOutputs for MotorModel {
     }
 }
 
-/// Remembers what lights and buzzer were told. Implements [`Indicator`]; clones share the memory.
+/// Records the signals for lights and buzzer. Implements [`Indicator`]; clones share the record.
 #[derive(Clone, Debug)]
 pub struct IndicatorRecorder {
     clock: Clock,
@@ -53,13 +55,13 @@ impl IndicatorRecorder {
         Self { clock: clock.clone(), changes: Rc::default() }
     }
 
-    /// Every change of the signal with its instant, oldest first.
+    /// All changes of the signal with their instants, oldest first.
     #[must_use]
     pub fn changes(&self) -> Vec<(Instant, Signal)> {
         self.changes.borrow().clone()
     }
 
-    /// What is shown now.
+    /// The present signal; `None` before the first.
     #[must_use]
     pub fn showing(&self) -> Option<Signal> {
         self.changes.borrow().last().map(|(_, signal)| *signal)
@@ -74,12 +76,12 @@ impl Indicator for IndicatorRecorder {
     }
 }
 
-/// A button that a script presses. Implements [`Button`]; clones are the same button.
+/// A button pressed by a script. Implements [`Button`]; clones are the same button.
 #[derive(Clone, Debug, Default)]
 pub struct ButtonModel(Rc<Cell<bool>>);
 
 impl ButtonModel {
-    /// Presses it, or lets it go.
+    /// Presses or releases it.
     pub fn press(&self, pressed: bool) {
         self.0.set(pressed);
     }

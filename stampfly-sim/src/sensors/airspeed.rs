@@ -1,8 +1,9 @@
-//! A pitot tube with a differential pressure sensor like Sensirion's SDP33.
+//! Pitot tube with a differential pressure sensor like Sensirion's SDP33.
 //!
-//! It measures the dynamic pressure of the air along the body's x axis, `½·ρ·v·|v|`. What is left of its zero, the sensor's scale and
-//! its noise are drawn from the seed. A tube that is blocked, iced or disconnected is a fault: [`Line`](crate::fault::Line) changes
-//! what comes out of the model. Not for angles at which a tube fails (beyond some 20°), and without the lag of long hoses.
+//! Measures the dynamic pressure of the air along the body's x axis, `½·ρ·v·|v|`. Residual zero
+//! offset, scale and noise are drawn from the seed. For a blocked, iced or disconnected tube change
+//! the samples with a [`Line`](crate::fault::Line). Not valid at flow angles beyond about 20°; the
+//! lag of long hoses is not modelled.
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
@@ -13,23 +14,25 @@ use stampfly_drivers::{Airspeed, Sample};
 use stampfly_types::messages::AirspeedData;
 use stampfly_types::{Duration, Instant};
 
-/// Averages reported per second.
+/// Averages reported per second, 1/s.
 const RATE: f64 = 50.0;
 const READ_OUT: Duration = Duration::from_micros(500);
-/// What is left of the zero, standard deviation, Pa: the data sheet's accuracy at zero (0.2 Pa), and some wind while it was zeroed.
+/// Residual zero offset, standard deviation, Pa: accuracy at zero of the data sheet (0.2 Pa) plus
+/// wind during zeroing.
 const OFFSET: f64 = 0.5;
-/// Bound of the scale's error: 3 % of the reading (data sheet, span accuracy).
+/// Bound of the scale error: 3 % of the reading (data sheet, span accuracy).
 const SCALE: f64 = 0.03;
-/// Standard deviation of an average of 20 ms, Pa: the sensor's noise is below; turbulence at the tube is an assumption.
+/// Standard deviation of an average over 20 ms, Pa. The sensor's noise is smaller; turbulence at
+/// the tube is an assumption.
 const DEVIATION: f64 = 0.3;
 /// Resolution, Pa: 20 counts per pascal (data sheet).
 const RESOLUTION: f64 = 0.05;
 /// Range, Pa.
 const RANGE: f64 = 1500.0;
-/// Of the air in the fuselage, °C, without what warms the vehicle.
+/// Temperature of the air in the fuselage without heating of the vehicle, °C.
 const TEMPERATURE: f64 = 20.0;
 
-/// The model of a pitot tube. Implements [`Airspeed`].
+/// Model of a pitot tube. Implements [`Airspeed`].
 ///
 /// ```
 /// use stampfly_drivers::Airspeed;
@@ -58,7 +61,7 @@ pub struct AirspeedModel {
 }
 
 impl AirspeedModel {
-    /// A tube that has been zeroed. `seed` is of everything random.
+    /// A zeroed tube. `seed` draws its errors and noise.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64) -> Self {
         let mut noise = Noise::stream(seed, Stream::Airspeed);
@@ -72,7 +75,7 @@ impl AirspeedModel {
         }
     }
 
-    /// What is left of the zero, Pa, and the factor on the pressure.
+    /// Residual zero offset, Pa, and factor on the pressure.
     #[must_use]
     pub fn errors(&self) -> (f64, f64) {
         (self.offset, self.scale)
@@ -82,6 +85,7 @@ impl AirspeedModel {
         let motion = self.world.motion_at(at);
         let (air, density) = self.world.inspect(|body| (body.air(-motion.position.z), body.air_density()));
         let ahead = motion.attitude.inverse_transform_vector(&(motion.velocity - air)).x;
+        // Signed: a tube reads suction when the air comes from behind.
         let dynamic = 0.5 * density * ahead * ahead.abs();
         let pressure = self.scale * dynamic + self.offset + DEVIATION * self.noise.normal();
         let temperature = TEMPERATURE + self.world.warmth_at(at) + 0.05 * self.noise.normal();

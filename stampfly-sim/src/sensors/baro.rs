@@ -1,4 +1,5 @@
-//! The barometer, BMP280: new conversions at some 13 Hz, a slow drift, and the propellers' own pressure.
+//! Barometer BMP280: conversions at about 13 Hz, slow drift, and the pressure caused by the
+//! propellers.
 
 use super::schedule::Schedule;
 use super::weather::{Doors, Wander};
@@ -10,18 +11,18 @@ use stampfly_drivers::{Barometer, Sample};
 use stampfly_types::messages::BaroData;
 use stampfly_types::{Duration, Instant};
 
-/// Conversion time plus 62.5 ms of standby.
+/// Conversions per second: conversion time plus 62.5 ms of standby.
 pub(crate) const RATE: f64 = 13.5;
 const READ_OUT: Duration = Duration::from_micros(400);
 /// Pressure at the floor, Pa.
 const FLOOR_PRESSURE: f64 = 101_000.0;
-/// Standard deviation of one conversion after the chip's filter, Pa: 6 cm, what the static records show.
+/// Standard deviation of one conversion after the chip's filter, Pa: 6 cm, as in static records.
 pub(crate) const DEVIATION: f64 = 0.7;
 /// Resolution, Pa.
 const RESOLUTION: f64 = 0.16;
 /// Drift by weather and warming, Pa/√s.
 const DRIFT: f64 = 0.12;
-/// Height over which the floor's share fades, m.
+/// Height over which the additional wash at the floor decays, m.
 const WASH_HEIGHT: f64 = 0.2;
 
 /// Pressure altitude in the standard atmosphere (ICAO doc 7488, troposphere), m.
@@ -29,16 +30,17 @@ fn altitude(pressure: f64) -> f64 {
     44_330.77 * (1.0 - libm::pow(pressure / 101_325.0, 0.190_263))
 }
 
-/// The air at the chip, shared by the model and the register-level emulator.
+/// Air pressure at the chip, shared by the model and the register-level emulator.
 #[derive(Debug)]
 pub(crate) struct BaroPhysics {
     world: World,
     noise: Noise,
     drift: f64,
     start: Instant,
-    /// Of the propellers' pressure: in units of what the vehicle says, and how much more there is at the floor.
+    /// Strength of the propellers' wash relative to the vehicle's value, and additional share at
+    /// the floor.
     wash: [f64; 2],
-    /// `None` in a room where nothing moves but the vehicle.
+    /// Wander of the room's pressure, if enabled.
     wander: Option<Wander>,
     doors: Option<Doors>,
 }
@@ -47,7 +49,7 @@ impl BaroPhysics {
     pub(crate) fn new(world: &World, start: Instant, mut noise: Noise, seed: u64) -> Self {
         let conditions = world.conditions();
         Self {
-            // Specimens differ by a metre or ten.
+            // Specimens differ by several metres.
             drift: 60.0 * noise.normal(),
             noise,
             start,
@@ -58,16 +60,18 @@ impl BaroPhysics {
         }
     }
 
-    /// One conversion at `at`, Pa, `period` seconds after the one before, with noise of this standard deviation.
+    /// One conversion at `at`, Pa, `period` seconds after the previous one, with noise of this
+    /// standard deviation.
     pub(crate) fn pressure(&mut self, at: Instant, period: f64, deviation: f64) -> f64 {
         let motion = self.world.motion_at(at);
         let (hover, wash) = self.world.inspect(|body| (body.nominal_rotor_speed(), body.disturbance().wash));
         let height = -motion.position.z;
-        // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa per metre.
+        // Density of air at 20 °C and this pressure, times gravity: 11.8 Pa/m.
         let still = FLOOR_PRESSURE - 11.77 * height;
         let thrust = motion.rotor_speed.iter().map(|w| (w / hover) * (w / hover)).sum::<f64>() / 4.0;
         let [strength, at_floor] = self.wash;
         let wash = wash * strength * thrust * (1.0 + at_floor * libm::exp(-height.max(0.0) / WASH_HEIGHT));
+        // Random walk, scaled by the time since the last conversion.
         self.drift += DRIFT * period.sqrt() * self.noise.normal();
         let (deviation, wander) = match &mut self.wander {
             Some(wander) => (Wander::white(deviation), wander.after(period)),
@@ -77,14 +81,14 @@ impl BaroPhysics {
         quiet + wander + self.doors.as_mut().map_or(0.0, |doors| doors.at(at))
     }
 
-    /// Temperature of the die, °C.
+    /// Die temperature, °C.
     pub(crate) fn temperature(&self, at: Instant) -> f32 {
         let minutes = at.since(self.start).seconds() / 60.0;
         25.0 + 8.0 * minutes / (minutes + 2.0)
     }
 }
 
-/// The model of the barometer. Implements [`Barometer`].
+/// Model of the barometer. Implements [`Barometer`].
 #[derive(Debug)]
 pub struct BaroModel {
     clock: Clock,
@@ -128,12 +132,12 @@ mod tests {
     use crate::Conditions;
     use crate::plant::{Body, Disturbance, Motion};
 
-    /// Of the rotors in a hover, rad/s.
+    /// Rotor speed in hover, rad/s.
     const HOVER: f64 = 3_000.0;
-    /// Pressure of the propellers then, as the vehicle says, Pa.
+    /// Wash in hover given by the vehicle, Pa.
     const WASH: f64 = 2.5;
 
-    /// It stays where it is, with rotors that turn.
+    /// A body that keeps its position with turning rotors.
     #[derive(Debug)]
     struct Held(Motion);
 
@@ -153,8 +157,8 @@ mod tests {
         }
     }
 
-    /// Pressure that the propellers add at a height, m, when they turn `faster` times as fast as in a
-    /// hover, Pa.
+    /// Pressure added by the propellers at a height, m, with rotors at `faster` times their hover
+    /// speed, Pa.
     fn added(conditions: &Conditions, height: f64, faster: f64) -> f64 {
         let pressure = |faster: f64| {
             let mut motion = Motion { rotor_speed: [HOVER * faster; 4], ..Motion::default() };
@@ -163,7 +167,7 @@ mod tests {
             let noise = Noise::stream(1, Stream::Baro);
             BaroPhysics::new(&world, Instant::ZERO, noise, 1).pressure(Instant::from_millis(100), 0.07, DEVIATION)
         };
-        // The same noise in both.
+        // Both have the same noise, which cancels.
         pressure(faster) - pressure(0.0)
     }
 

@@ -1,8 +1,8 @@
-//! Motion capture: cameras in the room that see the vehicle's markers a hundred times a second.
+//! Motion capture: cameras in the room that observe the vehicle's markers at 100 Hz.
 //!
-//! A pose is good to a millimetre and a fifth of a degree and thirty milliseconds old when it arrives: exposure,
-//! triangulation, radio. The system's frame is set where the vehicle stands at the start. Poses are lost when fewer than
-//! three markers are seen, one in a hundred here.
+//! A pose has a standard deviation of 1 mm and 0.003 rad and arrives 30 ms old: exposure,
+//! triangulation, radio. The origin of the system's frame is the initial pose of the vehicle. Poses
+//! are lost when fewer than three markers are visible, here one in a hundred.
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
@@ -15,15 +15,15 @@ use stampfly_types::Duration;
 use stampfly_types::messages::ExternalPose;
 
 const RATE: f64 = 100.0;
-/// From the exposure to the arrival on board.
+/// Delay from the exposure to the arrival on board.
 const LATENCY: Duration = Duration::from_micros(30_000);
 /// Standard deviations, m and rad.
 const POSITION: f64 = 0.001;
 const ATTITUDE: f64 = 0.003;
-/// Share of the poses that are lost.
+/// Share of lost poses.
 const LOST: f64 = 0.01;
 
-/// The model of the cameras. Implements [`MotionCapture`].
+/// Model of the motion capture system. Implements [`MotionCapture`].
 #[derive(Debug)]
 pub struct CameraModel {
     world: World,

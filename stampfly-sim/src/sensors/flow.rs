@@ -1,5 +1,5 @@
-//! The optical flow sensor, PMW3901: it compares pictures at 121 Hz and adds up counts; the driver reads them at
-//! 100 Hz, so a read holds the motion of one picture or of two.
+//! Optical flow sensor PMW3901: it compares pictures at 121 Hz and accumulates counts. The driver
+//! reads at 100 Hz, so a read contains the motion of one or two pictures.
 
 use super::schedule::Schedule;
 use super::swept::MotionError;
@@ -14,21 +14,21 @@ use stampfly_types::{Duration, Instant};
 
 /// Pictures per second.
 const FRAME_RATE: f64 = 121.0;
-/// Reads per second, by the processor's clock.
+/// Reads per second by the processor's clock.
 const READ_RATE: f64 = 100.0;
 /// Angle of one count, rad.
 const COUNT: f64 = 0.00222;
-/// Below this height the picture is out of focus (data sheet).
+/// Height below which the picture is out of focus, m (data sheet).
 const FOCUS: f64 = 0.08;
-/// Here nothing of the motion is left in the picture: the vehicle stands.
+/// Height at which the picture contains no motion any more, m: the vehicle stands.
 const BLIND: f64 = 0.035;
-/// Above this height quality falls, to nothing at [`FAR`].
+/// Height above which quality falls, down to zero at [`FAR`], m.
 const DIM: f64 = 2.5;
 const FAR: f64 = 4.5;
-/// The driver vouches for a sample from this quality on.
+/// Least quality of a sample that the driver marks as valid.
 const MINIMUM_QUALITY: u8 = 25;
 
-/// The pictures and what is counted in them, shared by the model and the register-level emulator.
+/// Exposure and counting, shared by the model and the register-level emulator.
 #[derive(Debug)]
 pub(crate) struct FlowPhysics {
     world: World,
@@ -36,20 +36,20 @@ pub(crate) struct FlowPhysics {
     frames: Schedule,
     /// Number of the next picture.
     frame: u64,
-    /// Counts not yet read, with the fraction that is carried on.
+    /// Counts not yet read, including the fraction carried over.
     counts: [f64; 2],
     /// Scale and mounting error of this specimen: rows x and y.
     mounting: [[f64; 2]; 2],
     motion: MotionError,
-    /// From the last picture that is counted to the read, beyond half a picture.
+    /// Delay from the last counted picture to the read, beyond half a picture.
     delay: Duration,
     texture: f64,
 }
 
-/// The model of the flow sensor. Implements [`OpticalFlow`].
+/// Model of the flow sensor. Implements [`OpticalFlow`].
 ///
-/// `Sample::at` is the instant of the read, all the driver can know; the newest picture is on average half a picture
-/// older.
+/// `Sample::at` is the instant of the read, because a driver knows no other; the newest picture is
+/// on average half a picture older.
 #[derive(Debug)]
 pub struct FlowModel {
     clock: Clock,
@@ -59,10 +59,12 @@ pub struct FlowModel {
 }
 
 impl FlowPhysics {
-    /// The physics and the instants at which the processor reads.
+    /// The physics, and the schedule of the processor's reads.
     pub(crate) fn new(world: &World, start: Instant, seed: u64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Flow);
         let conditions = world.conditions();
+        // Scale common to both axes, with a stream of its own so that the other draws are
+        // independent of it.
         let common = 1.0 + Noise::stream(seed, Stream::FlowSpecimen).within(conditions.flow_scale);
         let mut scale = || common * (1.0 + noise.within(conditions.flow_axis_scale));
         let (scale_x, scale_y) = (scale(), scale());
@@ -83,13 +85,14 @@ impl FlowPhysics {
         (physics, reads)
     }
 
-    /// Takes the pictures up to `at` and gives the whole counts since the last call, in the convention of
-    /// [`FlowData`].
+    /// Exposes the pictures up to `at` and returns the whole counts since the last call, in the
+    /// convention of [`FlowData`].
     pub(crate) fn read(&mut self, at: Instant) -> [f64; 2] {
         while self.frames.instant(self.frame) + self.delay <= at {
             self.expose(self.frame);
             self.frame += 1;
         }
+        // The chip has 16-bit registers; the fraction stays for the next read.
         let whole = self.counts.map(|counts| counts.round().clamp(-32768.0, 32767.0));
         for (counts, whole) in self.counts.iter_mut().zip(whole) {
             *counts -= whole;
@@ -97,21 +100,24 @@ impl FlowPhysics {
         whole
     }
 
-    /// Adds the motion from the previous picture to picture `number`.
+    /// Adds the motion between the previous picture and picture `number`.
     fn expose(&mut self, number: u64) {
         let end = self.frames.instant(number);
         let period = self.frames.period();
         let begin = end - Duration::from_micros(period as u64);
         let middle = begin + end.since(begin) / 2;
+        // Begin, middle and end of the interval between the pictures.
         let motions = [begin, middle, end].map(|instant| over_floor(&self.world, instant));
         let rates = motions.map(|motion| angular_flow(&motion));
         let height = slant_height(&motions[1]);
+        // Linear loss of contrast below the focus distance.
         let sharp = ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
         let deviation = 0.25 + 0.15 * height.min(FAR);
-        // Simpson's rule over the picture.
+        // Simpson's rule over the time between the pictures.
         let swept: [f64; 2] =
             core::array::from_fn(|axis| (rates[0][axis] + 4.0 * rates[1][axis] + rates[2][axis]) / 6.0 * period * 1e-6);
         let swept = self.motion.of(swept, period * 1e-6);
+        // Beyond the range there are no counts at all, not even noise.
         let seen = f64::from(u8::from(height < FAR));
         for (row, counts) in self.mounting.iter().zip(&mut self.counts) {
             let angle = row[0] * swept[0] + row[1] * swept[1];
@@ -119,7 +125,7 @@ impl FlowPhysics {
         }
     }
 
-    /// Features found in the picture, the chip's SQUAL.
+    /// Number of features in the picture: the chip's SQUAL.
     pub(crate) fn quality(&mut self, instant: Instant) -> u8 {
         let height = slant_height(&over_floor(&self.world, instant));
         let near = 0.5 + 0.5 * ((height - BLIND) / (FOCUS - BLIND)).clamp(0.0, 1.0);
@@ -135,7 +141,7 @@ impl FlowModel {
     }
 }
 
-/// The motion relative to the floor below.
+/// Motion relative to the floor below.
 fn over_floor(world: &World, instant: Instant) -> Motion {
     let mut motion = world.motion_at(instant);
     world.inspect(|plant| {
@@ -146,13 +152,14 @@ fn over_floor(world: &World, instant: Instant) -> Motion {
     motion
 }
 
-/// Distance along the optical axis to the floor, m; very large when the sensor looks at the horizon.
+/// Distance to the floor along the optical axis, m; 1000 m if the axis points near or above the
+/// horizon.
 fn slant_height(motion: &Motion) -> f64 {
     let down = (motion.attitude * nalgebra::Vector3::z()).z;
     if down > 0.1 { (-motion.position.z / down).max(0.001) } else { 1e3 }
 }
 
-/// Angular rate of the picture, body x and y, in the convention of [`FlowData`].
+/// Angular rate of the picture about body x and y, rad/s, in the convention of [`FlowData`].
 fn angular_flow(motion: &Motion) -> [f64; 2] {
     let velocity = motion.attitude.inverse_transform_vector(&motion.velocity);
     let height = slant_height(motion);

@@ -1,8 +1,10 @@
-//! A satellite receiver like a u-blox M8: fixes a few times a second, late, with an error that wanders by a metre or two.
+//! Satellite receiver like a u-blox M8: a few fixes per second, delayed, with a position error that
+//! wanders by a metre or two.
 //!
-//! Position errors are a first-order Gauss-Markov process (what satellites, ionosphere and reflections do to all fixes of some
-//! minutes) and white noise (of one fix); velocity errors are white. The receiver's own smoothing is left out, and so are steps when
-//! a satellite goes. A jammed receiver is a fault: [`Line`](crate::fault::Line) changes what comes out of it. Not for RTK.
+//! Position errors are the sum of a first-order Gauss-Markov process (satellites, ionosphere,
+//! multipath: common to all fixes of some minutes) and white noise; velocity errors are white. The
+//! receiver's filter and steps when the set of satellites changes are not modelled. For jamming
+//! change the samples with a [`Line`](crate::fault::Line). Not for RTK.
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
@@ -14,31 +16,31 @@ use stampfly_drivers::{Gnss, Sample};
 use stampfly_types::messages::{GnssData, GnssFix};
 use stampfly_types::{Duration, Instant, Origin};
 
-/// A fix for an instant longer ago is not begun any more: the world forgets.
+/// Age above which no fix is begun: the world keeps only the recent past.
 const TOO_OLD: Duration = Duration::from_millis(70);
-/// Delays differ by up to this, s: messages wait for each other on the receiver's port.
+/// Bound of the delay's variation, s: messages wait for each other on the receiver's port.
 const JITTER: f64 = 0.005;
-/// Time from a fix without height to one with it.
+/// Time from the first two-dimensional to the first three-dimensional fix.
 const FLAT: Duration = Duration::from_secs(1);
 
-/// A satellite receiver, and where on Earth it is.
+/// Configuration of a satellite receiver, and the geographic position of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssConfig {
-    /// Of the world's frame.
+    /// Geographic position of the world's origin.
     pub origin: Origin,
     /// Fixes per second.
     pub rate: f64,
-    /// From the instant of a fix to its message, s. At most 50 ms more than a period.
+    /// Delay from the instant of a fix to its message, s. At most 50 ms more than a period.
     pub delay: f64,
-    /// From the start to the first fix with a height, s.
+    /// Time from the start to the first three-dimensional fix, s.
     pub first_fix: f64,
-    /// In use.
+    /// Satellites in use.
     pub satellites: u8,
-    /// Standard deviation of the wandering error along north and east, and along down, m.
+    /// Standard deviation of the wandering error: horizontal per axis, and vertical, m.
     pub wander: [f64; 2],
-    /// Its correlation time, s.
+    /// Correlation time of the wandering error, s.
     pub correlation: f64,
-    /// Standard deviation of a fix's own error along north and east, and along down, m.
+    /// Standard deviation of the white error: horizontal per axis, and vertical, m.
     pub noise: [f64; 2],
     /// Standard deviation of the velocity per axis, m/s.
     pub speed_noise: f64,
@@ -47,10 +49,11 @@ pub struct GnssConfig {
 impl GnssConfig {
     /// A u-blox M8 under an open sky, at 5 Hz, with a warm start.
     ///
-    /// The delay lies between the 110 ms that PX4 takes for receivers by default (`EKF2_GPS_DELAY`) and the 120 ms that ArduPilot takes
-    /// for an M8, rounded up. The data sheet (UBX-15031086) promises 2.5 m of error that half of all fixes keep, 0.05 m/s for half of all
-    /// velocities, and 1 s to the first fix when hot and 26 s when cold. How the position's error divides into wander and noise, and that
-    /// it is somewhat better than promised, are assumptions.
+    /// The delay lies between PX4's default of 110 ms (`EKF2_GPS_DELAY`) and the 120 ms that
+    /// ArduPilot assumes for an M8, rounded up. The data sheet (UBX-15031086) specifies 2.5 m CEP,
+    /// 0.05 m/s for half of all velocities, and a first fix after 1 s hot and 26 s cold. The
+    /// division of the position error into wander and noise, and a total somewhat better than
+    /// specified, are assumptions.
     #[must_use]
     pub const fn m8(origin: Origin) -> Self {
         Self {
@@ -67,9 +70,10 @@ impl GnssConfig {
     }
 }
 
-/// The model of a satellite receiver. Implements [`Gnss`].
+/// Model of a satellite receiver. Implements [`Gnss`].
 ///
-/// `Sample::at` is the instant of the fix; it is delivered the delay later. Whoever asks late misses fixes.
+/// `Sample::at` is the instant of the fix; the sample is delivered after the delay. A caller that
+/// asks late misses fixes.
 ///
 /// ```
 /// use stampfly_drivers::Gnss;
@@ -99,18 +103,18 @@ pub struct GnssModel {
     config: GnssConfig,
     schedule: Schedule,
     noise: Noise,
-    /// When the receiver was switched on.
+    /// Instant of power-on.
     start: Instant,
-    /// The wandering error, world NED, m.
+    /// Wandering error, world NED, m.
     wander: Vector3<f64>,
 }
 
 impl GnssModel {
-    /// A receiver that is switched on now. `seed` is of everything random.
+    /// A receiver that is powered on now. `seed` draws its errors.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, config: &GnssConfig) -> Self {
         let mut noise = Noise::stream(seed, Stream::Gnss);
-        // Satellites keep its clock.
+        // No tolerance of the rate: the receiver's clock follows the satellites.
         let schedule = Schedule::new(clock.now(), config.rate, 0.0, &mut noise);
         let wander = deviations(config.wander).component_mul(&noise.normal3());
         Self {
@@ -124,7 +128,7 @@ impl GnssModel {
         }
     }
 
-    /// The error of the position that later fixes share, world NED, m, as it is now.
+    /// The present wandering error of the position, world NED, m.
     #[must_use]
     pub fn wander(&self) -> Vector3<f64> {
         self.wander
@@ -133,8 +137,10 @@ impl GnssModel {
     fn fix(&mut self, at: Instant) -> GnssData {
         let config = self.config;
         let motion = self.world.motion_at(at);
+        // Exact discretisation of the first-order process over one period.
         let keep = libm::exp(-1.0 / (config.rate * config.correlation.max(1e-3)));
         let drive = (1.0 - keep * keep).sqrt();
+        // All draws are made for every fix, so that the sequence is independent of the fix type.
         let [fresh, own, speed] = [(); 3].map(|()| self.noise.normal3());
         self.wander = self.wander * keep + deviations(config.wander).component_mul(&fresh) * drive;
 
@@ -150,7 +156,7 @@ impl GnssModel {
         let velocity = motion.velocity + speed * config.speed_noise;
         let (latitude, longitude) = config.origin.global([place.x as f32, place.y as f32]);
         let accuracy = |axis: usize| libm::hypot(config.wander[axis], config.noise[axis]);
-        // Receivers count in millimetres.
+        // The receiver's messages have a resolution of 1 mm and 1 mm/s.
         let millimetres = |metres: f64| ((metres * 1000.0).round() / 1000.0) as f32;
         GnssData {
             fix,

@@ -1,5 +1,5 @@
-//! The inertial sensor, a BMI270 as the StampFly uses it: ±8 g, ±2000 °/s, 1600 Hz into a FIFO that is read in
-//! fours and decimated to 400 Hz.
+//! Inertial sensor BMI270 as the StampFly uses it: ±8 g, ±2000 °/s, 1600 Hz into a FIFO read in
+//! groups of four and decimated to 400 Hz.
 
 use super::mounting::Mounting;
 use super::schedule::Schedule;
@@ -21,35 +21,36 @@ const GYRO_SCALE: f64 = 16.4 * 180.0 / core::f64::consts::PI;
 const RATE: f64 = 1600.0;
 /// Samples in one FIFO read.
 const GROUP: usize = 4;
-/// Interrupt and burst read after the last sample of a group.
+/// Delay of interrupt and burst read after the last sample of a group.
 const LATENCY: Duration = Duration::from_micros(120);
-/// A reader later than this has lost samples (the world's memory is 80 ms).
+/// Delay of the reader above which samples are lost (the world keeps 80 ms).
 const MEMORY: Duration = Duration::from_micros(60_000);
 
-/// Noise per sample: density times the square root of half the rate. Densities per axis from a static record
-/// (x, y, z): accelerometer in m/s²/√Hz, gyroscope in rad/s/√Hz.
+/// Noise densities per axis (x, y, z) from a static record: accelerometer, m/s²/√Hz, gyroscope,
+/// rad/s/√Hz. Noise per sample is the density times the square root of half the rate.
 const ACCEL_DENSITY: [f64; 3] = [0.00113, 0.00122, 0.00141];
 const GYRO_DENSITY: [f64; 3] = [0.000146, 0.000145, 0.000148];
 /// Turn-on offset of the accelerometer, standard deviation per axis, m/s².
 const ACCEL_BIAS: f64 = 0.12;
 /// Turn-on offset of the gyroscope, bound per axis: 1 °/s.
 const GYRO_BIAS: f64 = 0.017_453;
-/// Wander of the offsets, per √s.
+/// Random walk of the offsets, per √s.
 const ACCEL_WALK: f64 = 3e-4;
 const GYRO_WALK: f64 = 2e-5;
-/// Change of the offsets with temperature, bounds per axis: 0.25 mg and 0.015 °/s a kelvin (BMI270's data sheet, tables 2 and 3).
+/// Temperature coefficients of the offsets, bounds per axis: 0.25 mg/K and 0.015 °/s/K (data sheet
+/// of the BMI270, tables 2 and 3).
 const ACCEL_DRIFT: f64 = 2.45e-3;
 const GYRO_DRIFT: f64 = 2.6e-4;
-/// The drift is none at this temperature, °C.
+/// Temperature without drift, °C.
 const REFERENCE: f64 = 25.0;
 
-/// What reaches the chip and what the chip makes of it, shared by the model and the register-level emulator.
+/// Inertial input and its conversion, shared by the model and the register-level emulator.
 #[derive(Debug)]
 pub(crate) struct ImuPhysics {
     world: World,
     noise: Normals,
     vibration: Vibration,
-    /// Samples made so far.
+    /// Number of samples made.
     samples: u64,
     start: Instant,
     accel_bias: Vector3<f64>,
@@ -57,18 +58,18 @@ pub(crate) struct ImuPhysics {
     /// Misalignment and scale.
     accel_matrix: Matrix3<f64>,
     gyro_matrix: Matrix3<f64>,
-    /// `None` where it should be.
+    /// Mounting error, if the conditions have one.
     mounting: Option<Mounting>,
-    /// Of accelerometer and gyro, per kelvin; `None` of a sensor that has none.
+    /// Temperature coefficients of accelerometer and gyro, 1/K, if imperfections are enabled.
     drift: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl ImuPhysics {
-    /// The physics and the times of its samples, which are always 1600 a second.
+    /// The physics, and the schedule of its samples, which always have 1600 Hz.
     pub(crate) fn new(world: &World, start: Instant, seed: u64, vibration: f64) -> (Self, Schedule) {
         let mut noise = Noise::stream(seed, Stream::Imu);
         let schedule = Schedule::new(start, RATE, 0.02, &mut noise);
-        // Half a degree between the axes, half a per cent of scale.
+        // Half a degree between the axes, and 0.5 % of scale.
         let mut matrix = || Matrix3::identity() + Matrix3::from_fn(|_, _| noise.within(0.005));
         let (mut accel_matrix, mut gyro_matrix) = (matrix(), matrix());
         let mounting = Mounting::of(world, seed);
@@ -109,10 +110,11 @@ impl ImuPhysics {
         (physics, schedule)
     }
 
-    /// The next sample, taken at `at`: accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s, body.
+    /// The next sample, taken at `at`: accelerometer x, y, z, m/s², gyroscope x, y, z, rad/s, body.
     pub(crate) fn sample(&mut self, at: Instant) -> [f64; 6] {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
+        // Lever arm first, then misalignment and scale, offset, and temperature drift.
         let force = self.mounting.map_or(motion.specific_force, |mounting| mounting.felt(&motion));
         let mut accel = self.accel_matrix * force + self.accel_bias;
         let mut gyro = self.gyro_matrix * motion.rate + self.gyro_bias;
@@ -121,6 +123,7 @@ impl ImuPhysics {
             accel += of_accel * warmer;
             gyro += of_gyro * warmer;
         }
+        // White noise of density n, sampled at the rate r, has the standard deviation n·√(r/2).
         let per_sample = (RATE / 2.0).sqrt();
         let noise: [f64; 6] = self.noise.next();
         let sample = core::array::from_fn(|channel| {
@@ -132,6 +135,7 @@ impl ImuPhysics {
             value + shake[channel] + density * per_sample * noise[channel]
         });
         self.samples += 1;
+        // The slow random walk is advanced once per group.
         if self.samples.is_multiple_of(GROUP as u64) {
             let wander = (GROUP as f64 / RATE).sqrt();
             self.accel_bias += Vector3::from(self.noise.next()) * (ACCEL_WALK * wander);
@@ -140,23 +144,23 @@ impl ImuPhysics {
         sample
     }
 
-    /// Temperature of the die, °C: it warms by ten degrees within a few minutes, and by what somebody does to it.
+    /// Die temperature, °C: it warms by 10 K within a few minutes, plus [`World::warm`].
     pub(crate) fn temperature(&self, at: Instant) -> f32 {
         let minutes = at.since(self.start).seconds() / 60.0;
         25.0 + 10.0 * minutes / (minutes + 2.0) + self.world.warmth_at(at) as f32
     }
 }
 
-/// A value as counts of the converter, which saturates as the chip does.
+/// Converts a value to counts, rounded and saturated as in the chip.
 pub(crate) fn to_counts(value: f64, counts_per_unit: f64) -> i16 {
     let counts = value * counts_per_unit;
     (counts + 0.5f64.copysign(counts)) as i16
 }
 
-/// The model of the inertial sensor. Implements [`Imu`](stampfly_drivers::Imu) at 400 Hz.
+/// Model of the inertial sensor. Implements [`Imu`](stampfly_drivers::Imu) at 400 Hz.
 ///
-/// `Sample::at` is the instant in the middle of the decimation filter, three chip samples (1.9 ms) before the newest
-/// one; with the read-out it is 2 ms old when it is delivered.
+/// `Sample::at` is the centre of the decimation filter, three chip samples (1.9 ms) before the
+/// newest one; including read-out a sample is 2 ms old when it is delivered.
 #[derive(Debug)]
 pub struct ImuModel {
     clock: Clock,
@@ -181,8 +185,8 @@ impl ImuModel {
         }
     }
 
-    /// The present offsets, which an estimator has to find: accelerometer (m/s²) and gyroscope (rad/s), without the
-    /// rectification of vibration.
+    /// The present offsets, which an estimator has to find: accelerometer, m/s², and gyroscope,
+    /// rad/s, without the rectification of vibration.
     #[must_use]
     pub fn bias(&self) -> (Vec3, Vec3) {
         (self.physics.accel_bias.cast::<f32>().into(), self.physics.gyro_bias.cast::<f32>().into())
@@ -194,14 +198,15 @@ impl ImuModel {
         core::array::from_fn(|channel| to_counts(sample[channel], if channel < 3 { ACCEL_SCALE } else { GYRO_SCALE }))
     }
 
-    /// The next group of four as it comes out of the FIFO, with the instant of its first sample.
+    /// The next group of four samples from the FIFO in counts, with the instant of its first
+    /// sample.
     ///
-    /// For comparisons with recordings that were filtered in other ways; flight code wants
+    /// For comparison with recordings that were filtered differently; flight code uses
     /// [`Imu::next`](stampfly_drivers::Imu::next).
     pub async fn next_group(&mut self) -> (Instant, [[i16; 6]; GROUP]) {
         let now = self.clock.now();
         if now.since(self.schedule.instant(self.cursor)) > MEMORY {
-            // Overrun: the oldest samples are gone, and what the filter remembers with them.
+            // Overrun: the oldest samples are lost, and the filter's history with them.
             let first = self.schedule.upcoming(now, MEMORY.as_micros() as f64 * 0.5);
             self.cursor = first;
             (self.decimator, self.peak) = Default::default();
@@ -215,7 +220,7 @@ impl ImuModel {
     }
 }
 
-/// Counts, possibly fractions of them, in SI units.
+/// Converts counts, which may be fractional, to SI units: accelerometer, m/s², gyroscope, rad/s.
 #[must_use]
 pub fn counts_to_si(counts: [f64; 6]) -> (Vec3, Vec3) {
     let [ax, ay, az, gx, gy, gz] = counts;

@@ -1,90 +1,99 @@
-//! The light of a range finder: how much of it comes back, from where, and from how far enough does.
+//! Light budget of a range finder: maximum range, cone, and crosstalk of a cover glass.
 //!
-//! **Ceiling.** ST's data sheet of the VL53L1X (DocID031281, tables 6 and 7), the same sensor with the same laser, gives the longest range by reflectance
-//! and ambient light, 100 ms a measurement:
+//! **Maximum range.** ST's data sheet of the VL53L1X (DocID031281, tables 6 and 7), which has the
+//! same sensor and laser, gives the maximum range by reflectance and ambient light for measurements
+//! of 100 ms:
 //!
-//! | cm | dark | 50·10³/s a detector | 200·10³/s |
+//! | cm | dark | 50·10³/s per detector | 200·10³/s |
 //! |---|---:|---:|---:|
 //! | white, 88 % | 360 | 166 | 73 |
 //! | grey, 54 % | 340 | 154 | 69 |
 //! | grey, 17 % | 170 | 114 | 68 |
 //!
-//! In the dark it goes with the square root of the reflectance, because light comes back with the inverse square of the distance. Ambient light has a ceiling of its own
-//! that hardly depends on the floor: detectors are blind after each photon. The two join as their inverse squares, within 12 % of the table. The VL53L3CX
-//! at 33 ms reaches 300 cm where that one reaches 381 ("up to 300 cm+", DS13204), and all of it is taken to shrink alike.
+//! In the dark it is proportional to the square root of the reflectance, because the signal falls
+//! with the inverse square of the distance. Ambient light sets a limit that hardly depends on the
+//! floor: detectors are blind after each photon. The two limits combine as their inverse squares,
+//! within 12 % of the table. The VL53L3CX at 33 ms reaches 300 cm where the VL53L1X reaches 381
+//! ("up to 300 cm+", DS13204); all ranges are scaled by this ratio.
 //!
-//! **Cone.** The sensor sees all that is within 12.5° of its axis (DS13204), weighted with the inverse square of its distance. What lies within the
-//! length of the pulse is one echo, at its mean; what lies farther apart are several, and the strongest one is reported.
+//! **Cone.** The sensor sees everything within 12.5° of its axis (DS13204), weighted with the
+//! inverse square of the distance. Targets within the length of the pulse form one echo at their
+//! mean; targets farther apart form several, of which the strongest is reported.
 //!
-//! **Cover.** A window over the sensor sends some light back at once (ST AN5231). It is an echo of its own near zero: it pulls what is near towards it,
-//! and it is all there is when the floor is out of reach. The part corrects what its host has calibrated; no firmware of the StampFly does.
+//! **Cover.** A window over the sensor returns some light immediately (ST AN5231). This is a
+//! separate echo near zero: it biases near targets towards itself, and it is the only echo when the
+//! floor is out of range. The part compensates crosstalk only after a calibration by the host,
+//! which the StampFly's firmware does not perform.
 
 use crate::conditions::Conditions;
 use nalgebra::Vector3;
 
-/// The chip says no more than this, m.
+/// Largest distance that the chip reports, m.
 pub(crate) const MAXIMUM: f64 = 4.0;
 /// Reflectance of the white chart.
 const WHITE: f64 = 0.88;
-/// Ceiling by ambient light of 50·10³/s, over the ceiling over a white floor in the dark, and how it falls with the light.
+/// Maximum range at an ambient light of 50·10³/s, relative to that over a white floor in the dark,
+/// and the exponent of its fall with the light.
 const AMBIENT_CEILING: f64 = 0.446;
 const AMBIENT_EXPONENT: f64 = 0.61;
-/// Light that comes back from a floor of 40 % at one metre, 10⁶ photons a second on all detectors.
+/// Signal from a floor of 40 % at one metre, 10⁶ photons/s over all detectors.
 const FLOOR: f64 = 8.0;
 const FLOOR_REFLECTANCE: f64 = 0.4;
-/// Ambient light of a dim room, likewise, and the detectors on which it falls.
+/// Ambient light of a dim room in the same unit, and number of exposed detectors.
 const DIM_ROOM: f64 = 0.5;
 const DETECTORS: f64 = 200.0;
-/// The nearest a floor can be for the square of its distance to count, m.
+/// Least distance in the inverse square law, m.
 const NEAR: f64 = 0.05;
-/// Echoes farther apart than this are two: the length of the pulse, 2.5 bins of 0.2 m.
+/// Distance between targets above which their echoes are separate, m: length of the pulse, 2.5 bins
+/// of 0.2 m.
 const PULSE: f64 = 0.5;
-/// Where the light of the cover seems to come from, m.
+/// Apparent distance of the cover's echo, m.
 const COVER: f64 = 0.02;
-/// Beams that make up the cone, each for the same solid angle: how far out, in units of the half angle, and how many.
+/// Rings of beams that sample the cone with equal solid angles: angle in units of the half angle,
+/// and number of beams.
 const RINGS: [(f64, usize); 3] = [(0.0, 1), (0.48, 4), (0.83, 8)];
 
-/// Light that comes back from somewhere.
+/// One echo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Echo {
-    /// Mean way to it, m.
+    /// Mean distance of the target, m.
     pub distance: f64,
-    /// What would come back of it from one metre, 10⁶ photons a second on all detectors.
+    /// Signal that the target would return from one metre, 10⁶ photons/s over all detectors.
     pub brightness: f64,
 }
 
 impl Echo {
-    /// Nothing comes back.
+    /// No echo.
     pub const NONE: Self = Self { distance: 0.0, brightness: 0.0 };
 
-    /// What comes back, 10⁶ photons a second on all detectors.
+    /// Signal of the echo, 10⁶ photons/s over all detectors.
     pub fn rate(&self) -> f64 {
         self.brightness / self.distance.max(NEAR).powi(2)
     }
 }
 
-/// What comes back: the echo of the cover and one or two of the floor. Those that are not there have no brightness.
+/// One or two echoes of the floor, and that of the cover. Missing echoes have a brightness of 0.
 pub(crate) type Echoes = [Echo; 3];
 
-/// The optics of one specimen over one floor, in one light.
+/// Optics of one specimen over one floor in one light.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
-    /// Directions in the body's frame; the first one is the axis.
+    /// Directions of the beams, body; the first is the axis.
     beams: Vec<Vector3<f64>>,
-    /// By how much the cone sees a level floor too far.
+    /// Factor by which the cone overestimates the distance of a level floor; divided out.
     level: f64,
-    /// Light from one metre, 10⁶/s.
+    /// Signal from one metre, 10⁶/s.
     floor: f64,
-    /// 10⁶/s.
+    /// Signal of the cover, 10⁶/s.
     cover: f64,
-    /// Ambient, 10⁶/s.
+    /// Ambient light, 10⁶/s.
     pub ambient: f64,
-    /// Longest range, m.
+    /// Maximum range, m.
     pub ceiling: f64,
 }
 
 impl Light {
-    /// Of a range finder that looks along `axis`, body.
+    /// Optics of a range finder that looks along `axis`, body.
     pub fn new(conditions: &Conditions, axis: Vector3<f64>) -> Self {
         let beams = beams(&axis, conditions.range_cone);
         let down: Vec<_> = beams.iter().map(|beam| 1.0 / beam.dot(&axis)).collect();
@@ -98,30 +107,34 @@ impl Light {
         }
     }
 
-    /// The axis, body.
+    /// The optical axis, body.
     pub fn axis(&self) -> Vector3<f64> {
         self.beams[0]
     }
 
-    /// What comes back when a beam in a direction, body, meets something at this distance; `None` where there is nothing.
+    /// The echoes. `meets` returns the distance of the target along a direction, body, or `None`
+    /// without a target.
     pub fn echoes(&self, meets: impl Fn(&Vector3<f64>) -> Option<f64>) -> Echoes {
         let cover = Echo { distance: COVER, brightness: self.cover * NEAR.powi(2) };
         let each = self.floor / self.beams.len() as f64;
         let mut met: Vec<_> = self.beams.iter().filter_map(meets).map(|distance| distance / self.level).collect();
+        // Sorted by distance, the first gap longer than the pulse separates near and far targets.
         met.sort_by(f64::total_cmp);
         let is_apart = |pair: &[f64]| matches!(pair, [near, far] if far - near > PULSE);
         let split = met.windows(2).position(is_apart).map_or(met.len(), |place| place + 1);
         [mean(&met[..split], each), mean(&met[split..], each), cover]
     }
 
-    /// What the part reports of these: the strongest echo, drawn towards the others that are within its pulse. `None` when nothing comes back.
+    /// The distance that the part reports: that of the strongest echo, biased towards others within
+    /// its pulse. `None` without an echo.
     ///
-    /// An echo of the floor beyond the ceiling does not count beside the cover's, if that one is as bright as a floor at the ceiling: less than that is
-    /// no target.
+    /// If the floor is beyond the maximum range, the cover's echo is reported instead, provided
+    /// that it is as bright as a floor at the maximum range; a weaker one is not a target.
     pub fn reported(&self, echoes: &Echoes) -> Option<f64> {
         let [near, far, cover] = echoes;
         let floor = if far.rate() > near.rate() { far } else { near };
         let (of_floor, of_cover) = (floor.rate(), cover.rate());
+        // Signal of a floor at the maximum range.
         let least = self.floor / self.ceiling.powi(2);
         let is_out_of_reach = of_floor == 0.0 || floor.distance > self.ceiling;
         if is_out_of_reach && of_cover >= least {
@@ -136,7 +149,7 @@ impl Light {
     }
 }
 
-/// The longest range under these conditions, m.
+/// The maximum range under these conditions, m.
 fn ceiling(conditions: &Conditions) -> f64 {
     let Conditions { range_reach: reach, floor_reflectance, ambient_light, .. } = conditions;
     let in_the_dark = reach * (floor_reflectance / WHITE).sqrt();
@@ -144,7 +157,8 @@ fn ceiling(conditions: &Conditions) -> f64 {
     (in_the_dark.powi(-2) + by_ambient.powi(-2)).sqrt().recip().min(MAXIMUM)
 }
 
-/// One echo of what lies at these distances, each this bright: where it is in the mean of its light.
+/// Combines targets of equal brightness at these distances into one echo, at the signal-weighted
+/// mean.
 fn mean(distances: &[f64], each: f64) -> Echo {
     match distances {
         [] => Echo::NONE,
@@ -159,7 +173,7 @@ fn mean(distances: &[f64], each: f64) -> Echo {
     }
 }
 
-/// The beams of a cone around an axis; the axis alone when it has no width.
+/// Directions of the beams of a cone around an axis; only the axis for a cone without width.
 fn beams(axis: &Vector3<f64>, half_angle: f64) -> Vec<Vector3<f64>> {
     if half_angle == 0.0 {
         return vec![*axis];
@@ -198,7 +212,7 @@ mod tests {
         assert_eq!(light.reported(&light.echoes(|_| None)), None);
     }
 
-    /// VL53L1X, tables 6 and 7, in the reach that its white chart has here.
+    /// VL53L1X, tables 6 and 7, with the maximum range of its white chart.
     #[test]
     fn the_ceiling_is_the_data_sheets() {
         let rows = [(0.88, [3.6, 1.66, 0.73]), (0.54, [3.4, 1.54, 0.69]), (0.17, [1.7, 1.14, 0.68])];
@@ -221,7 +235,8 @@ mod tests {
         let level = light.echoes(|beam| Some(1.0 / beam.z));
         assert!((light.reported(&level).expect("floor") - 1.0).abs() < 1e-12);
         assert!((level[0].rate() / 8.0 - 1.0).abs() < 0.05, "as much light as of a beam");
-        // Tilted by 25° the axis meets the floor at 1.1034 m; the nearer half of the cone sends more back.
+        // Tilted by 25°, the axis meets the floor at 1.1034 m; the nearer half of the cone returns
+        // more light.
         let (sin, cos) = 25f64.to_radians().sin_cos();
         let tilted = light.echoes(|beam| Some(1.0 / (cos * beam.z + sin * beam.x)));
         let reported = light.reported(&tilted).expect("floor");
@@ -232,7 +247,7 @@ mod tests {
     fn an_edge_in_the_cone_is_between_and_a_deep_one_is_the_stronger_of_two() {
         let light = light(&Conditions { range_cone: 0.218, ..Conditions::GENTLE });
         let over = |table: f64, share: f64| {
-            // What lies to the one side of the axis is the table.
+            // The table covers one side of the axis.
             light.echoes(move |beam| Some(if beam.x > 0.2 * share { table } else { 1.0 } / beam.z))
         };
         let half = light.reported(&over(0.7, 0.0)).expect("both");
@@ -256,7 +271,7 @@ mod tests {
             [Some(1.5); 2],
             "it does not hide what is far"
         );
-        // A clean window is no target; what a hand has smeared is one, when there is nothing else.
+        // A clean window is not a target; a smeared one is, if there is no other.
         assert_eq!([reported(0.5, Some(2.5)), reported(0.5, None)], [Some(2.5), None]);
         assert_eq!([reported(5.0, Some(2.5)), reported(5.0, None)], [Some(0.02); 2], "a false target near by");
     }

@@ -1,4 +1,5 @@
-//! The magnetometer, BMM150 at 25 Hz: the Earth's field, the vehicle's own iron and the motors' current.
+//! Magnetometer BMM150 at 25 Hz: Earth's field, hard and soft iron, and the field of the motor
+//! current.
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
@@ -18,23 +19,24 @@ const DEVIATION: f64 = 0.65;
 const RESOLUTION: f64 = 0.3;
 /// Standard deviation of the hard-iron offset per axis, µT.
 const HARD_IRON: f64 = 12.0;
-/// Bound of what soft iron and unequal gains add to each element of the symmetric matrix.
+/// Bound of the contribution of soft iron and unequal gains to each element of the symmetric
+/// matrix.
 const SOFT_IRON: f64 = 0.06;
-/// Share of the motors' field that flickers with the commutation.
+/// Relative fluctuation of the motors' field due to commutation.
 const FLICKER: f64 = 0.2;
 
-/// The field at the chip, shared by the model and the register-level emulator.
+/// Magnetic field at the chip, shared by the model and the register-level emulator.
 #[derive(Debug)]
 pub(crate) struct MagPhysics {
     world: World,
     noise: Noise,
     hard_iron: Vector3<f64>,
-    /// `None` of a sensor without.
+    /// Soft-iron matrix, if imperfections are enabled.
     soft_iron: Option<Matrix3<f64>>,
     idle_current: f64,
-    /// World NED, µT.
+    /// Earth's field, world NED, µT.
     earth: Vector3<f64>,
-    /// Of the motors, body, µT/A.
+    /// Field of the motor current, body, µT/A.
     per_ampere: Vector3<f64>,
 }
 
@@ -65,6 +67,7 @@ impl MagPhysics {
     /// One conversion at `at`, µT, body.
     pub(crate) fn field(&mut self, at: Instant) -> Vector3<f64> {
         let motion = self.world.motion_at(at);
+        // Commutation makes the field fluctuate in proportion to the current.
         let motors = (motion.current - self.idle_current).max(0.0) * (1.0 + FLICKER * self.noise.normal());
         let field = motion.attitude.inverse_transform_vector(&self.earth);
         self.soft_iron.map_or(field, |iron| iron * field)
@@ -74,7 +77,7 @@ impl MagPhysics {
     }
 }
 
-/// The model of the magnetometer. Implements [`Magnetometer`].
+/// Model of the magnetometer. Implements [`Magnetometer`].
 #[derive(Debug)]
 pub struct MagModel {
     clock: Clock,
@@ -92,7 +95,7 @@ impl MagModel {
         }
     }
 
-    /// The offset that a calibration has to find, µT, body.
+    /// The hard-iron offset, which a calibration has to find, µT, body.
     #[must_use]
     pub fn hard_iron(&self) -> stampfly_types::Vec3 {
         self.physics.hard_iron.cast::<f32>().into()

@@ -1,9 +1,10 @@
-//! The StampFly's chips as functions of the world: what they report, when, and how wrong.
+//! Sensor and actuator models of the StampFly and of other vehicles.
 //!
-//! Each model implements the trait of `stampfly-drivers` that the hardware's driver implements, and holds a handle
-//! to the world. Rates, ranges and resolutions are the chips'; each chip's clock is off by up to 2 %; noise,
-//! offsets and mounting errors are drawn from the seed. No model ever fails: faults act on what comes out of
-//! them ([`fault`](crate::fault)).
+//! Each model implements the trait of `stampfly-drivers` that the driver of the hardware
+//! implements, and holds a handle to the world. Rates, ranges and resolutions are those of the
+//! chips. Each chip's clock is off by up to 2 %; noise, offsets and mounting errors are drawn from
+//! the seed. Models never fail: faults act on their samples ([`fault`](crate::fault)). To test a
+//! driver use the register-level emulators in [`chips`](crate::chips).
 //!
 //! | model | chip | rate | trait |
 //! |---|---|---|---|
@@ -18,7 +19,8 @@
 //! | [`GnssModel`] | a satellite receiver like a u-blox M8, of other vehicles | 5 Hz | `Gnss` |
 //! | [`AirspeedModel`] | a pitot tube with an SDP33, of other vehicles | 50 Hz | `Airspeed` |
 //!
-//! Actuators: [`MotorModel`] (`MotorOutputs`), [`ServoModel`] (`ServoOutputs`, of aeroplanes), [`IndicatorRecorder`], [`ButtonModel`].
+//! Actuators: [`MotorModel`] (`MotorOutputs`), [`ServoModel`] (`ServoOutputs`, of aeroplanes),
+//! [`IndicatorRecorder`], [`ButtonModel`].
 
 mod actuators;
 mod airspeed;
@@ -54,7 +56,7 @@ pub use tof::{Mount, RangeModel};
 use crate::time::Clock;
 use crate::world::World;
 
-/// Everything that is soldered to the board, and the cameras around it.
+/// Sensors and actuators of the StampFly, and a motion capture system.
 #[derive(Debug)]
 pub struct Sensors {
     /// Inertial measurement unit.

@@ -1,25 +1,26 @@
-//! How an inertial sensor is mounted: askew, and beside the centre of mass.
+//! Mounting error of an inertial sensor: misalignment and lever arm.
 //!
-//! A chip is soldered to its board to a degree or so and the board sits in the frame to another. Beside the centre of mass it feels what turns
-//! it around that: `f + α × r + ω × (ω × r)`, the acceleration of a point of a rigid body. Gyroscope and accelerometer are one chip and are askew
-//! together; their scales are not.
-
+//! Chip on board and board in frame are each misaligned by about a degree. At a lever arm r from
+//! the centre of mass the sensor measures `f + α × r + ω × (ω × r)`, the specific force of that
+//! point of a rigid body. Gyroscope and accelerometer are one chip: they share the misalignment,
+//! but not the scale.
 use crate::noise::{Noise, Stream};
 use crate::world::{Inertial, World};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// How one specimen is mounted.
+/// Mounting of one specimen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mounting {
-    /// What accelerometer and gyroscope make of what is true at their place, beside what the chip itself does.
+    /// Matrices from true to measured values, in addition to the chip's own errors.
     pub accel: Matrix3<f64>,
     pub gyro: Matrix3<f64>,
-    /// From the centre of mass, body, m.
+    /// Position relative to the centre of mass, body, m.
     pub lever: Vector3<f64>,
 }
 
 impl Mounting {
-    /// The specimen of this seed; `None` when nothing of it is wrong, as in the gentle world.
+    /// The mounting of this seed; `None` if the conditions have no mounting error, as in the gentle
+    /// world.
     pub fn of(world: &World, seed: u64) -> Option<Self> {
         let conditions = world.conditions();
         let (askew, scale, lever) = (conditions.imu_misalignment, conditions.imu_scale, conditions.imu_lever);
@@ -29,20 +30,21 @@ impl Mounting {
         let mut noise = Noise::stream(seed, Stream::ImuMounting);
         let mut within = |bound: f64| Vector3::from_fn(|_, _| noise.within(bound));
         let turn = turned(&within(askew));
+        // Scale after rotation: each axis of the chip has its own.
         let mut scaled = || Matrix3::from_diagonal(&within(scale).map(|share| 1.0 + share)) * turn;
         Some(Self { accel: scaled(), gyro: scaled(), lever: within(lever) })
     }
 
-    /// Specific force at the chip's place, body, m/s².
+    /// Specific force at the chip's position, body, m/s².
     pub fn felt(&self, motion: &Inertial) -> Vector3<f64> {
         let Inertial { specific_force, rate, angular_acceleration, .. } = motion;
         specific_force + angular_acceleration.cross(&self.lever) + rate.cross(&rate.cross(&self.lever))
     }
 }
 
-/// From the body's axes into those of a chip that is turned by this rotation vector, rad.
+/// Rotation matrix from the body's axes into those of a chip rotated by this rotation vector, rad.
 fn turned(by: &Vector3<f64>) -> Matrix3<f64> {
-    // Not by nalgebra's function, whose sine is the machine's.
+    // Not nalgebra's constructor, whose sine depends on the platform.
     let angle = by.norm();
     let (sin, cos) = libm::sincos(0.5 * angle);
     let vector = if angle > 0.0 { by * (sin / angle) } else { Vector3::zeros() };

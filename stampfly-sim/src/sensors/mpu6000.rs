@@ -1,8 +1,9 @@
-//! The inertial sensor of small flight controllers, an MPU-6000 that is polled four thousand times a second: ±16 g, ±2000 °/s, no filter of its own but the one that
-//! cannot be switched off.
+//! Inertial sensor MPU-6000 of small flight controllers, polled at 4 kHz: ±16 g, ±2000 °/s, without
+//! its configurable low-pass filter.
 //!
-//! What it feels is that of the [emulated chip](crate::chips::Mpu6000), without its registers: the gyro converts 8000 times a second, the accelerometer 1000 times,
-//! so three of four samples repeat its last value.
+//! Has the physics of the [emulated chip](crate::chips::Mpu6000) without its registers. The gyro
+//! converts at 8 kHz and the accelerometer at 1 kHz, so three of four samples repeat the
+//! accelerometer's last value.
 
 use super::imu::to_counts;
 use super::schedule::Schedule;
@@ -14,16 +15,17 @@ use stampfly_drivers::Sample;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// Between two polls.
+/// Polling period.
 const PERIOD: Duration = Duration::from_micros(250);
-/// Reading fourteen bytes at 20 MHz, with its address.
+/// Time to read fourteen bytes and their address at 20 MHz.
 const READ_OUT: Duration = Duration::from_micros(8);
 /// Counts per m/s² at ±16 g.
 const ACCEL_SCALE: f64 = 2048.0 / GRAVITY as f64;
 /// Counts per rad/s at ±2000 °/s.
 const GYRO_SCALE: f64 = 16.4 * 180.0 / core::f64::consts::PI;
 
-/// The model. Implements [`Imu`](stampfly_drivers::Imu) at 4 kHz; a sample is the state of the chip's registers at that instant.
+/// Model of the sensor. Implements [`Imu`](stampfly_drivers::Imu) at 4 kHz; a sample is the content
+/// of the chip's registers at that instant.
 #[derive(Debug)]
 pub struct Mpu6000Model {
     clock: Clock,
@@ -33,20 +35,22 @@ pub struct Mpu6000Model {
     schedule: Schedule,
     /// Number of the next tick at 8 kHz.
     tick: u64,
-    /// What the accelerometer's registers hold.
+    /// Content of the accelerometer's registers.
     accel: [f64; 3],
 }
 
 impl Mpu6000Model {
-    /// The sensor of this vehicle, from its seed, with this strength of vibration.
+    /// The sensor of this vehicle with the specimen of this seed. `vibration` is the amplitude
+    /// relative to the recorded flights.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
         let (physics, schedule) = Physics::new(world, clock, seed, vibration);
         Self { clock: clock.clone(), start: clock.now(), polls: 0, physics, schedule, tick: 0, accel: [0.0; 3] }
     }
 
-    /// Accelerometer and gyro at this instant, as the registers have them.
+    /// Accelerometer and gyro registers at this instant, in SI units.
     fn convert(&mut self, at: Instant) -> [Vec3; 2] {
+        // The chip runs at its own rate between polls.
         while self.schedule.instant(self.tick) <= at {
             self.physics.tick(self.tick, 0, self.schedule.instant(self.tick));
             if self.tick.is_multiple_of(ACCEL_TICKS) {
@@ -67,7 +71,7 @@ impl stampfly_drivers::Imu for Mpu6000Model {
     type Error = Infallible;
 
     async fn next(&mut self) -> Result<Sample<ImuData>, Infallible> {
-        // A poll that is missed is not made up for.
+        // Missed polls are skipped.
         let since = self.clock.now().since(self.start).as_micros() / PERIOD.as_micros();
         self.polls = since.max(self.polls) + 1;
         let at = self.start + PERIOD * self.polls;

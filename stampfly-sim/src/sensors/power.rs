@@ -1,4 +1,4 @@
-//! The battery monitor, INA3221: voltage and mean current ten times a second.
+//! Battery monitor INA3221: voltage and mean current at 10 Hz.
 
 use super::schedule::Schedule;
 use crate::noise::{Noise, Stream};
@@ -21,9 +21,9 @@ const CURRENT_STEP: f64 = 0.004;
 pub(crate) struct PowerPhysics {
     world: World,
     noise: Noise,
-    /// Gain error of the shunt and the amplifier.
+    /// Gain error of shunt and amplifier.
     gain: f64,
-    /// Charge drawn at the previous sample, and when that was.
+    /// Charge drawn at the previous sample, C, and its instant.
     before: (f64, Instant),
 }
 
@@ -37,17 +37,19 @@ impl PowerPhysics {
         }
     }
 
-    /// Voltage now, V, and mean current since the call before, A.
+    /// Present voltage, V, and mean current since the previous call, A.
     pub(crate) fn measure(&mut self, now: Instant) -> [f64; 2] {
         self.world.advance_to(now);
         let (voltage, drawn) = self.world.inspect(|plant| (plant.battery().voltage(), plant.battery().drawn()));
+        // The mean over the interval comes from the charge, which includes every physics step.
         let mean = (drawn - self.before.0) / f64::from(now.since(self.before.1).seconds()).max(1e-3);
         self.before = (drawn, now);
         let voltage = voltage + 0.003 * self.noise.normal();
         [voltage, mean * self.gain + 0.003 * self.noise.normal()]
     }
 
-    /// Voltage, V, and current, A, averaged over a conversion, as far as the world remembers it.
+    /// Voltage, V, and current, A, averaged over a conversion, within the past that the world
+    /// keeps.
     pub(crate) fn mean(&mut self, begin: Instant, end: Instant) -> [f64; 2] {
         const POINTS: u64 = 8;
         let length = end.since(begin).as_micros();
@@ -62,7 +64,7 @@ impl PowerPhysics {
     }
 }
 
-/// The model of the battery monitor. Implements [`PowerMonitor`].
+/// Model of the battery monitor. Implements [`PowerMonitor`].
 #[derive(Debug)]
 pub struct PowerModel {
     clock: Clock,

@@ -1,4 +1,4 @@
-//! When a chip converts: its own clock, which is not the processor's.
+//! Conversion instants of a chip by its own clock, which differs from the processor's.
 
 use crate::noise::Noise;
 use stampfly_types::Instant;
@@ -12,13 +12,14 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// Nominally `rate` hertz, off by up to the share `tolerance`, starting anywhere within the first period.
+    /// Nominally `rate` hertz with an error of up to the share `tolerance`, starting at random
+    /// within the first period.
     pub(crate) fn new(start: Instant, rate: f64, tolerance: f64, noise: &mut Noise) -> Self {
         let period = 1e6 / rate * (1.0 + noise.within(tolerance));
         Self { first: start.as_micros() as f64 + period * noise.unit(), period, next: 0 }
     }
 
-    /// Length of one period by the chip's clock, in true microseconds.
+    /// Length of one period of the chip's clock, in true microseconds.
     pub(crate) fn period(&self) -> f64 {
         self.period
     }
@@ -28,14 +29,17 @@ impl Schedule {
         Instant::from_micros((self.first + number as f64 * self.period) as u64)
     }
 
-    /// Periods between conversion zero and the end of this microsecond; at the instant of a conversion at least its number.
+    /// Number of periods between conversion zero and the end of this microsecond; at the instant of
+    /// a conversion at least its number.
     pub(crate) fn phase(&self, at: Instant) -> f64 {
         (at.as_micros() as f64 + 1.0 - self.first) / self.period
     }
 
-    /// The conversion to report next: the one after the last reported, unless newer ones have already replaced it
-    /// in the chip's registers by `now`. A conversion can be read `latency` microseconds after its instant.
+    /// The next conversion to report: the one after the last reported, unless newer ones have
+    /// overwritten it in the chip's registers by `now`. A conversion can be read `latency`
+    /// microseconds after its instant.
     pub(crate) fn upcoming(&self, now: Instant, latency: f64) -> u64 {
+        // Number of the newest conversion that can be read now.
         let ready = (now.as_micros() as f64 - latency - self.first) / self.period;
         self.next.max(ready.max(0.0) as u64)
     }

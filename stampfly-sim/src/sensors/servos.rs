@@ -1,7 +1,7 @@
-//! The output stage of servos: pulses of 1000 to 2000 µs.
+//! Output stage for servos: pulses of 1000 to 2000 µs.
 //!
-//! What a servo makes of its pulses, its lag and its speed, is part of the aeroplane ([`plant`](crate::plant)). Nothing moves on a
-//! body without surfaces.
+//! Lag and speed of the servos belong to the aeroplane ([`plant`](crate::plant)). On a body without
+//! control surfaces nothing moves.
 
 use crate::plant::{Aeroplane, SURFACES, Surface};
 use crate::time::Clock;
@@ -10,10 +10,10 @@ use core::convert::Infallible;
 use stampfly_drivers::ServoOutputs;
 use stampfly_types::messages::ServoOutput;
 
-/// Steps from the middle to the end: pulses are counted in microseconds.
+/// Resolution: microseconds from the centre to the end.
 const STEPS: f64 = 500.0;
 
-/// The servos of an aeroplane. Implements [`ServoOutputs`].
+/// Servo outputs of an aeroplane. Implements [`ServoOutputs`].
 ///
 /// ```
 /// use stampfly_drivers::ServoOutputs;
@@ -38,7 +38,8 @@ pub struct ServoModel {
 }
 
 impl ServoModel {
-    /// Servos that move these surfaces, in the order of [`ServoOutput::deflection`]. Several may move the same; the last one wins.
+    /// Servos that move these surfaces, in the order of [`ServoOutput::deflection`]. If several
+    /// move the same surface, the last one wins.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, surfaces: &[Surface]) -> Self {
         Self { world: world.clone(), clock: clock.clone(), surfaces: surfaces.to_vec() }
@@ -52,6 +53,7 @@ impl ServoOutputs for ServoModel {
         let mut shares = [0.0; SURFACES];
         let told = output.deflection.iter().take(usize::from(output.count));
         for (surface, wanted) in self.surfaces.iter().zip(told) {
+            // A value that is not finite centres the servo.
             let wanted = if wanted.is_finite() { f64::from(wanted.clamp(-1.0, 1.0)) } else { 0.0 };
             shares[*surface as usize] = (wanted * STEPS).round() / STEPS;
         }

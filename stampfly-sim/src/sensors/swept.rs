@@ -1,22 +1,26 @@
-//! What a flow sensor makes of the angle that goes by from one picture to the next: how far it can follow, and how wrong it is in proportion.
+//! Errors of a flow sensor that depend on the motion between two pictures: limited search window,
+//! and proportional noise.
 //!
-//! A PMW3901 finds where a picture has gone by comparing it with the one before, within a window. Its data sheet gives 7.4 rad/s as the fastest
-//! motion: 61 mrad from one picture to the next, 28 counts. What goes by faster leaves the window. The best match that is left is at its edge
-//! while the true one is just beyond it, and anywhere when that is farther: a texture that repeats looks as if it had gone the other way. How far
-//! beyond the edge still counts as the edge the data sheet does not say; a quarter of the window here, *unverified*.
+//! A PMW3901 finds the displacement of a picture by comparison with the previous one within a
+//! search window. The data sheet specifies up to 7.4 rad/s: 61 mrad per picture, 28 counts. A
+//! larger displacement leaves the window. While it is just outside, the best match is at the
+//! window's edge; beyond that the match is arbitrary, and a repeating texture appears to move the
+//! other way. The data sheet does not give the transition; here it is a quarter of the window,
+//! *unverified*.
 //!
-//! The error in proportion comes from a floor whose texture is now coarse and now fine, and from light that changes. How large it is in one picture the recordings of
-//! carried StampFlys do not say: neighbouring reads of one motion differ by a third of it already because one holds two pictures and the next one. It is taken to be
-//! 3 to 20 %, *unverified*.
+//! The proportional error comes from varying coarseness of the texture and varying light. The
+//! recordings of carried StampFlys do not show its size in one picture, because successive reads of
+//! the same motion already differ by a third when one contains two pictures and the next contains
+//! one. It is assumed to be 3 to 20 %, *unverified*.
 
 use crate::conditions::Conditions;
 use crate::noise::{Noise, Stream};
 use crate::normals::Normals;
 
-/// Share of the window beyond its edge from where the best match is still at the edge.
+/// Share of the window beyond its edge up to which the best match is at the edge.
 const EDGE: f64 = 0.25;
 
-/// The errors that a flow sensor makes because something moves.
+/// Motion-dependent errors of one flow sensor.
 #[derive(Debug)]
 pub(super) struct MotionError {
     noise: Normals,
@@ -30,8 +34,9 @@ impl MotionError {
         Self { noise, share: conditions.flow_motion_noise, largest_rate: conditions.flow_largest_rate }
     }
 
-    /// What is seen of an angle that goes by about each axis, rad, in a picture of this length, s.
+    /// Measured angles for these angles swept about each axis, rad, in a picture of this length, s.
     pub fn of(&mut self, swept: [f64; 2], picture: f64) -> [f64; 2] {
+        // The window is given as a rate; its size in angle depends on the picture's length.
         let window = self.largest_rate * picture;
         let followed = swept.map(|angle| followed(angle, window));
         if self.share == 0.0 {
@@ -42,7 +47,7 @@ impl MotionError {
     }
 }
 
-/// Where the best match of a picture is that has moved by this angle, within a window of this half width.
+/// Position of the best match for a displacement, within a window of this half width, rad.
 fn followed(angle: f64, window: f64) -> f64 {
     let far = angle.abs();
     if far <= window {
@@ -50,7 +55,7 @@ fn followed(angle: f64, window: f64) -> f64 {
     } else if far <= (1.0 + EDGE) * window {
         window.copysign(angle)
     } else {
-        // Into −window to +window.
+        // Wrapped into −window to +window.
         let turns = libm::floor(angle / (2.0 * window) + 0.5);
         angle - turns * 2.0 * window
     }

@@ -1,4 +1,4 @@
-//! The range finders, VL53L3CX: one measurement every 33 ms along a fixed beam.
+//! Range finders VL53L3CX: one measurement every 33 ms along a fixed axis.
 
 use super::light::{Echo, Echoes, Light, MAXIMUM};
 use super::schedule::Schedule;
@@ -13,44 +13,45 @@ use stampfly_types::messages::TofData;
 use stampfly_types::{Duration, Instant};
 
 pub(crate) const RATE: f64 = 30.0;
-/// Reading 134 bytes over a 400 kHz bus.
+/// Time to read 134 bytes at 400 kHz.
 const READ_OUT: Duration = Duration::from_micros(3_200);
-/// Shortest range that can be told from the cover glass, m.
+/// Shortest range distinguishable from the cover glass, m.
 const MINIMUM: f64 = 0.020;
-/// Share of measurements lost for no reason that can be seen.
+/// Share of measurements lost without an external cause.
 const DROPOUTS: f64 = 0.003;
 
 /// `TofData::status`: valid.
 pub const STATUS_VALID: u8 = 0;
-/// `TofData::status`: the repeatability is too poor.
+/// `TofData::status`: standard deviation too large.
 pub const STATUS_SIGMA: u8 = 1;
-/// `TofData::status`: too little light came back.
+/// `TofData::status`: signal too weak.
 pub const STATUS_SIGNAL: u8 = 2;
 /// `TofData::status`: phase outside the valid range.
 pub const STATUS_OUT_OF_BOUNDS: u8 = 4;
 
-/// Which way a range finder looks.
+/// Direction of a range finder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mount {
     /// Down, along +z of the body.
     Bottom,
-    /// Forward, along +x of the body. There are no walls: it sees the floor when the nose is down, else nothing.
+    /// Forward, along +x of the body. The world has no visible walls: it sees only the floor, when
+    /// the nose is down.
     Front,
 }
 
-/// What the beam meets and what the chip makes of it, shared by the model and the register-level emulator.
+/// Target and measurement, shared by the model and the register-level emulator.
 #[derive(Debug)]
 pub(crate) struct RangePhysics {
     world: World,
     noise: Noise,
     light: Light,
-    /// Of this specimen: how long a metre is, and offset, m.
+    /// Scale factor and offset, m, of this specimen.
     scale: f64,
     offset: f64,
 }
 
 impl RangePhysics {
-    /// The physics and the times of its measurements.
+    /// The physics, and the schedule of its measurements.
     pub(crate) fn new(world: &World, start: Instant, seed: u64, mount: Mount) -> (Self, Schedule) {
         let (stream, specimen, axis) = match mount {
             Mount::Bottom => (Stream::BottomTof, Stream::BottomTofSpecimen, Vector3::z()),
@@ -69,7 +70,7 @@ impl RangePhysics {
         (physics, schedule)
     }
 
-    /// The distance along a direction, body; `None` when it misses the floor.
+    /// Distance to the floor along a direction, body; `None` if the beam misses it.
     fn distance(&self, motion: &Motion, direction: &Vector3<f64>) -> Option<f64> {
         let beam = motion.attitude * direction;
         (beam.z > 1e-3).then(|| self.world.inspect(|plant| plant.scene().distance(&motion.position, &beam)))
@@ -84,33 +85,36 @@ impl RangePhysics {
         self.light.echoes(|direction| self.distance(&motion, direction))
     }
 
-    /// What this specimen's light travels, and how much of it comes back.
+    /// Echoes at the distances that this specimen measures.
     pub(crate) fn optical_echoes(&self, instant: Instant) -> Echoes {
         self.echoes(instant).map(|echo| Echo { distance: echo.distance * self.scale + self.offset, ..echo })
     }
 
-    /// What comes back when something covers the window at this distance, m.
+    /// Echoes if an object covers the window at this distance, m.
     pub(crate) fn covered(&self, metres: f64) -> Echoes {
         self.light.echoes(|_| Some(metres))
     }
 
-    /// Ambient light, 10⁶ photons a second on all detectors.
+    /// Ambient light, 10⁶ photons/s over all detectors.
     pub(crate) fn ambient(&self) -> f64 {
         self.light.ambient
     }
 
-    /// A measurement around `instant`.
+    /// One measurement around `instant`.
     pub(crate) fn measure(&mut self, instant: Instant) -> TofData {
         let distance = self.light.reported(&self.echoes(instant));
         let ceiling = self.light.ceiling;
-        // The same number of draws whatever happens, so that one flight's noise does not depend on its course.
+        // Always the same number of draws, so that the noise sequence does not depend on the course
+        // of the flight.
         let (lost, normal) = (self.noise.chance(DROPOUTS), self.noise.normal());
         let invalid = |status| TofData { distance: 0.0, sigma: 0.0, status, valid: false };
+        // Between the maximum range and 1.2 times it the chip still gives a distance, marked as too
+        // weak.
         let Some(distance) = distance.filter(|d| *d <= ceiling * 1.2) else { return invalid(STATUS_SIGNAL) };
-        // As little light comes back as from where it would be in a dark room over a bright floor.
+        // Distance with the same signal-to-noise ratio in a dark room over a bright floor.
         let dim = distance * (MAXIMUM / ceiling);
         let sigma = 0.0008 + 0.0008 * dim + 0.0004 * dim * dim;
-        // Whole millimetres, as the chip counts them.
+        // The chip reports whole millimetres.
         let reading = ((distance * self.scale + self.offset + sigma * normal) * 1000.0).round().max(0.0) / 1000.0;
         let status = if lost {
             STATUS_SIGMA
@@ -125,9 +129,10 @@ impl RangePhysics {
     }
 }
 
-/// The model of a range finder. Implements [`RangeFinder`].
+/// Model of a range finder. Implements [`RangeFinder`].
 ///
-/// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its end.
+/// `Sample::at` is the middle of the measurement; the sample is delivered one read-out after its
+/// end.
 ///
 /// ```
 /// use stampfly_drivers::RangeFinder;
@@ -138,7 +143,7 @@ impl RangePhysics {
 /// let Ok(sample) = block_on(&simulation.clock, simulation.sensors.tof.next());
 /// assert!(sample.data.valid && (sample.data.distance - 0.03).abs() < 0.01, "standing");
 ///
-/// // A second one, looking forward, for vehicles that have it.
+/// // A second, front range finder, for vehicles that have one.
 /// let mut front = RangeModel::new(&simulation.world, &simulation.clock, 1, Mount::Front);
 /// let Ok(sample) = block_on(&simulation.clock, front.next());
 /// assert!(!sample.data.valid, "no wall in sight");
@@ -151,14 +156,15 @@ pub struct RangeModel {
 }
 
 impl RangeModel {
-    /// A range finder looking down or forward.
+    /// A range finder with this direction. `seed` draws its specimen and noise.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> Self {
         let (physics, schedule) = RangePhysics::new(world, clock.now(), seed, mount);
         Self { physics, schedule, clock: clock.clone() }
     }
 
-    /// The true distance along the beam to the floor at `instant`; `None` when the beam misses it.
+    /// True distance to the floor along the axis at `instant`, m; `None` if the axis misses the
+    /// floor.
     #[must_use]
     pub fn true_distance(&self, instant: Instant) -> Option<f64> {
         self.physics.true_distance(instant)
@@ -175,6 +181,7 @@ impl RangeFinder for RangeModel {
         let begin = self.schedule.instant(number);
         self.clock.sleep_until(begin + Duration::from_micros(latency as u64)).await;
         self.schedule.reported(number);
+        // The chip integrates over the whole period, so the distance belongs to its middle.
         let at = begin + Duration::from_micros((0.5 * period) as u64);
         Ok(Sample { at, data: self.physics.measure(at) })
     }

@@ -1,33 +1,36 @@
-//! The pressure of the air in a room: it wanders, and somebody opens a door.
+//! Air pressure in a room: wander, and doors.
 //!
-//! **Wander.** Four recordings of StampFlys that lie still (20 to 30 s each) have 1-s means that lie 0.20 to 0.34 m apart within 20 s and change by
-//! 0.16 to 0.19 m within 2 s. Differences between conversions have these deviations, in Pa, and what is here, white noise of 0.35 Pa and two first-order
-//! processes, 0.75 Pa over 0.4 s (the room's draughts, behind the chip's filter) and 0.9 Pa over 6 s (the building), has those:
+//! **Wander.** In four recordings of StampFlys at rest (20 to 30 s each) the 1-s means span 0.20 to
+//! 0.34 m within 20 s and change by 0.16 to 0.19 m within 2 s. The table gives standard deviations
+//! of differences between conversions, Pa. The model is white noise of 0.35 Pa plus two first-order
+//! processes: 0.75 Pa over 0.4 s (draughts in the room, after the chip's filter) and 0.9 Pa over 6
+//! s (the building).
 //!
-//! | s apart | 0.07 | 0.5 | 1 | 4 | 8 |
+//! | interval, s | 0.07 | 0.5 | 1 | 4 | 8 |
 //! |---|---:|---:|---:|---:|---:|
 //! | recorded | 0.59–0.70 | 1.04–1.12 | 1.19–1.32 | 1.33–1.71 | 1.49–2.47 |
-//! | here | 0.7 | 1.1 | 1.2 | 1.5 | 1.6 |
+//! | model | 0.7 | 1.1 | 1.2 | 1.5 | 1.6 |
 //!
-//! **Doors.** A closed room has another pressure than what is outside: by some pascals of wind and of ventilation, and by the swing of the door's leaf itself. When
-//! a door is opened or shut, the pressure changes within a second and stays, or comes back a few seconds later. Doors are the world's: whatever barometer
-//! hears of them hears the same ones.
+//! **Doors.** The pressure in a closed room differs from that outside by some pascals, due to wind,
+//! ventilation and the swing of the door itself. When a door is opened or closed, the pressure
+//! changes within a second and stays, or returns some seconds later. Doors belong to the world: all
+//! barometers of one seed see the same ones.
 
 use crate::conditions::Conditions;
 use crate::noise::{Noise, Stream};
 use stampfly_types::Instant;
 
-/// White noise of a conversion beside the wander, in units of the deviation without one: 0.35 Pa.
+/// White noise of a conversion with the wander enabled, relative to that without: 0.35 Pa.
 const WHITE: f64 = 0.5;
 /// Standard deviations, Pa, and correlation times, s.
 const PROCESSES: [(f64, f64); 2] = [(0.75, 0.4), (0.9, 6.0)];
-/// How long a door takes, and how long it stays open when it is shut again, s.
+/// Ranges of the duration of a swing, and of the time until a door closes again, s.
 const SWING: [f64; 2] = [0.3, 1.0];
 const OPEN: [f64; 2] = [1.0, 5.0];
-/// The smallest step, as a share of the largest one.
+/// Smallest step as a share of the largest.
 const SMALLEST: f64 = 0.3;
 
-/// The wander of the pressure at one barometer.
+/// Pressure wander at one barometer.
 #[derive(Debug)]
 pub(super) struct Wander {
     noise: Noise,
@@ -36,7 +39,7 @@ pub(super) struct Wander {
 }
 
 impl Wander {
-    /// `None` in a world whose pressure does not wander.
+    /// `None` if the conditions have no wander.
     pub fn new(conditions: &Conditions, seed: u64) -> Option<Self> {
         let strength = conditions.baro_wander;
         let mut noise = Noise::stream(seed, Stream::PressureWander);
@@ -44,12 +47,12 @@ impl Wander {
         (strength > 0.0).then_some(Self { noise, strength, values })
     }
 
-    /// The deviation of a conversion's white noise, of one that has this much without a wander.
+    /// Standard deviation of the white noise with the wander enabled; `deviation` is that without.
     pub fn white(deviation: f64) -> f64 {
         WHITE * deviation
     }
 
-    /// Pressure so many seconds after the last time, Pa.
+    /// Advances by `seconds` and returns the pressure, Pa.
     pub fn after(&mut self, seconds: f64) -> f64 {
         for (value, (deviation, time)) in self.values.iter_mut().zip(PROCESSES) {
             let keep = libm::exp(-seconds / time);
@@ -59,47 +62,47 @@ impl Wander {
     }
 }
 
-/// One door.
+/// Movement of one door.
 #[derive(Clone, Copy, Debug, Default)]
 struct Swing {
-    /// When it begins to open, s.
+    /// Begin, s.
     at: f64,
-    /// How long it takes, s.
+    /// Duration, s.
     within: f64,
-    /// When it begins to shut again, s after it began to open; never when it stays open.
+    /// Time from the begin until it closes again, s; `None` if it stays open.
     back: Option<f64>,
-    /// What it does to the pressure, Pa.
+    /// Change of pressure, Pa.
     step: f64,
 }
 
 impl Swing {
-    /// The share of it that has come about, s after the start.
+    /// Share of the step present at `time`, s after the start.
     fn share(&self, time: f64) -> f64 {
         let moved = |since: f64| (since / self.within).clamp(0.0, 1.0);
         moved(time - self.at) - self.back.map_or(0.0, |back| moved(time - self.at - back))
     }
 
-    /// Has all of it come about?
+    /// True when the movement is complete.
     fn is_over(&self, time: f64) -> bool {
         time > self.at + self.back.unwrap_or(0.0) + self.within
     }
 }
 
-/// The doors of the building.
+/// The doors of a building.
 #[derive(Debug)]
 pub(super) struct Doors {
     noise: Noise,
-    /// How often, 1/s, and the largest step, Pa.
+    /// Rate, 1/s, and largest step, Pa.
     often: f64,
     largest: f64,
     next: Swing,
-    /// What has stayed, Pa.
+    /// Sum of permanent steps, Pa.
     stayed: f64,
     start: Instant,
 }
 
 impl Doors {
-    /// `None` where nobody comes and goes.
+    /// `None` if the conditions have no doors.
     pub fn new(conditions: &Conditions, start: Instant, seed: u64) -> Option<Self> {
         let Conditions { baro_doors: often, baro_door: largest, .. } = *conditions;
         let noise = Noise::stream(seed, Stream::Doors);
@@ -111,14 +114,15 @@ impl Doors {
         Some(doors)
     }
 
-    /// The door after this time, s.
+    /// Draws the next door after this time, s.
     fn draw(&mut self, after: f64) -> Swing {
         let mut between = |[low, high]: [f64; 2]| low + (high - low) * self.noise.unit();
         let within = between(SWING);
         let back = between(OPEN);
         let step = self.largest * between([SMALLEST, 1.0]);
-        // As often as not it stays, and as often as not the pressure falls.
+        // Half of the steps are permanent, and half are negative.
         let (stays, falls) = (self.noise.chance(0.5), self.noise.chance(0.5));
+        // Exponentially distributed, so that doors are a Poisson process.
         let pause = -libm::log(1.0 - self.noise.unit()) / self.often;
         Swing {
             at: after + pause,
@@ -128,9 +132,10 @@ impl Doors {
         }
     }
 
-    /// What the doors have done to the pressure, Pa. Time does not go back.
+    /// Pressure caused by doors, Pa. Call it with ascending instants.
     pub fn at(&mut self, instant: Instant) -> f64 {
         let time = instant.since(self.start).seconds_f64();
+        // A permanent step is added to the sum before the next door is drawn.
         while self.next.is_over(time) {
             self.stayed += self.next.step * self.next.share(time);
             let end = self.next.at + self.next.back.unwrap_or(0.0) + self.next.within;
@@ -144,7 +149,7 @@ impl Doors {
 mod tests {
     use super::*;
 
-    /// Pressures of the wander and the white noise at the chip's rate, Pa, for this long.
+    /// Pressure of wander and white noise at the chip's rate, Pa, for this duration.
     fn pressures(seed: u64, seconds: usize) -> Vec<f64> {
         let conditions = Conditions { baro_wander: 1.0, ..Conditions::GENTLE };
         let mut wander = Wander::new(&conditions, seed).expect("it wanders");
@@ -152,7 +157,7 @@ mod tests {
         (0..seconds * 27 / 2).map(|_| wander.after(1.0 / 13.5) + Wander::white(0.7) * white.normal()).collect()
     }
 
-    /// Bars: the four recordings of the file's comment, each a tenth wider.
+    /// Limits: the four recordings of the module documentation, each widened by a tenth.
     #[test]
     fn neighbouring_pressures_differ_as_recorded() {
         let pressures = pressures(1, 4_000);
@@ -167,7 +172,7 @@ mod tests {
 
     #[test]
     fn means_of_a_second_lie_as_far_apart_as_recorded() {
-        // Metres, as the recordings are told in.
+        // In metres, the unit of the recordings' figures.
         let mut ranges = Vec::new();
         let mut changes = Vec::new();
         for seed in 0..60 {

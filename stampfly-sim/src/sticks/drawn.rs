@@ -1,9 +1,9 @@
-//! Sticks drawn from a seed: anywhere, for any time, in any mode, with the switches turned in between.
+//! Sticks drawn from a seed: any position, duration and mode, with switch changes in between.
 //!
-//! What a pilot's hands can do at most, not what they usually do. In modes that hold the height each
-//! stick is at the centre, at a stop, or anywhere. In manual modes the throttle stays about the hover
-//! for most of the time, because few vehicles survive anything else for long; the file says that it
-//! hovers at the centre ([`Throttle::of_file`](super::Throttle)).
+//! Covers what a pilot's hands can do at most, not what they usually do. In modes that hold height
+//! each stick is centred, at a stop, or anywhere. In manual modes the throttle stays near hover
+//! most of the time, because few vehicles survive anything else for long; the file defines hover as
+//! the centre ([`Throttle::of_file`](super::Throttle)).
 
 use super::file::Row;
 use crate::noise::Noise;
@@ -11,25 +11,26 @@ use stampfly_types::Duration;
 use stampfly_types::messages::{FlightMode, PilotInput};
 use std::vec::Vec;
 
-/// Random number stream; those of vehicles, missions, faults and campaigns are others.
+/// Random number stream, different from those of vehicles, missions, faults and campaigns.
 const STREAM: u64 = 1_200;
-/// How long it is flown, s.
+/// Range of the duration, s.
 const LENGTH: [f64; 2] = [5.0, 25.0];
-/// How long sticks stay where they are, s: from a frame of the transmitter to a lean that crosses a room.
+/// Range of the time for which sticks hold a position, s: from one transmitter frame to a tilt that
+/// crosses a room.
 const HOLDS: [f64; 2] = [0.02, 2.0];
-/// How often a new place of the sticks comes with another mode, or with a request to turn over.
+/// Probability that a new position comes with another mode, and with a flip request.
 const SWITCHES: f64 = 0.1;
 const FLIPS: f64 = 0.02;
-/// How often one begins on the ground, with the throttle at its lowest for this long, s.
+/// Probability of a start on the ground, and the time with lowest throttle then, s.
 const ON_GROUND: f64 = 0.3;
 const LOWEST_FOR: f64 = 0.5;
-/// Deflections of the throttle about the hover in a manual mode, and of the other sticks.
+/// Range of the throttle around hover in manual modes.
 const THROTTLE: f64 = 0.3;
-/// How often the throttle goes to a stop in a manual mode, and for how long at most, s.
+/// Probability of a throttle at a stop in manual modes, and its longest duration, s.
 const PUNCHES: f64 = 0.1;
 const PUNCH: f64 = 0.5;
 
-/// The rows of this seed, armed from the first one on.
+/// The rows of this seed, armed from the first row on.
 pub(super) fn rows(seed: u64) -> Vec<Row> {
     let mut dice = Dice(Noise::new(seed, STREAM));
     let mut mode = dice.mode();
@@ -44,6 +45,7 @@ pub(super) fn rows(seed: u64) -> Vec<Row> {
         if dice.0.chance(SWITCHES) {
             mode = dice.mode();
         }
+        // Uniform in the logarithm: short and long holds are equally likely.
         let mut holds = HOLDS[0] * (HOLDS[1] / HOLDS[0]).powf(dice.0.unit());
         let throttle = if !mode.is_manual() {
             dice.stick()
@@ -61,7 +63,7 @@ pub(super) fn rows(seed: u64) -> Vec<Row> {
     rows
 }
 
-/// With whole milliseconds, so that a file says it with three digits.
+/// Rounds to whole milliseconds, so that a file needs three decimals.
 fn row(time: f64, input: PilotInput) -> Row {
     Row { at: Duration::from_millis((1e3 * time).round() as u64), input, flip: false, land: false }
 }
@@ -77,7 +79,7 @@ impl Dice {
         if self.0.chance(0.5) { 1.0 } else { -1.0 }
     }
 
-    /// At the centre, at a stop, or anywhere.
+    /// Centred, at a stop, or anywhere.
     fn stick(&mut self) -> f32 {
         match self.0.unit() {
             place if place < 0.3 => 0.0,
@@ -86,7 +88,8 @@ impl Dice {
         }
     }
 
-    /// Modes that hold the height twice as often as the others: in them the vehicle has a part.
+    /// Modes that hold height are more than twice as likely as the others, because the vehicle's
+    /// own control acts in them.
     fn mode(&mut self) -> FlightMode {
         match self.0.unit() {
             place if place < 0.35 => FlightMode::PosHold,

@@ -1,43 +1,43 @@
-//! Why a text is no stick file.
+//! Errors of stick files.
 
 use super::file::{LATEST, LONGEST_LINE, MODES, MOST_BYTES, MOST_ROWS};
 use core::fmt;
 
-/// Most characters of a field that an error repeats.
+/// Largest number of characters of a field repeated in an error.
 const SHOWN: usize = 24;
 
-/// Why a text is no stick file, and where.
+/// Error in a stick file, with its line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StickError {
-    /// Line, from one; zero is the file as a whole.
+    /// Line, from 1; 0 for the file as a whole.
     pub line: usize,
-    /// What is wrong.
+    /// The error.
     pub kind: StickErrorKind,
 }
 
-/// What is wrong with a stick file.
+/// Kind of an error in a stick file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StickErrorKind {
-    /// The file cannot be read: what the system says.
+    /// The file cannot be read, with the system's message.
     Unreadable(String),
-    /// There is no header.
+    /// No header.
     Empty,
-    /// There is a header and no row.
+    /// A header without rows.
     NoRows,
-    /// The file has more bytes than are read.
+    /// More bytes than [`MOST_BYTES`].
     TooLarge,
-    /// There are more rows than are read.
+    /// More rows than [`MOST_ROWS`].
     TooManyRows,
-    /// The line has more bytes than are read.
+    /// A line with more bytes than [`LONGEST_LINE`].
     LineTooLong,
-    /// The line is not UTF-8.
+    /// A line is not UTF-8.
     NotText,
     /// The header lacks this column.
     MissingColumn(&'static str),
-    /// The header has a column that means nothing.
+    /// The header has an unknown column.
     UnknownColumn(String),
-    /// The header has this column twice.
+    /// The header has a column twice.
     RepeatedColumn(&'static str),
     /// The row has another number of fields than the header.
     FieldCount {
@@ -46,23 +46,23 @@ pub enum StickErrorKind {
         /// Fields of the header.
         wanted: usize,
     },
-    /// The field is no number in the range of its column.
+    /// The field is not a number in the range of its column.
     Number {
         /// The column.
         column: &'static str,
-        /// What stands there.
+        /// Content of the field.
         text: String,
     },
     /// The field is neither 0 nor 1.
     Level {
         /// The column.
         column: &'static str,
-        /// What stands there.
+        /// Content of the field.
         text: String,
     },
-    /// The field is no flight mode.
+    /// The field is not a flight mode.
     Mode(String),
-    /// The time is before that of the row above.
+    /// The time is earlier than that of the previous row.
     GoesBack(String),
 }
 
@@ -72,7 +72,7 @@ impl StickErrorKind {
     }
 }
 
-/// As much of a foreign text as an error repeats.
+/// Shortens a text for display in an error.
 pub(super) fn clipped(text: &str) -> String {
     let mut shown: String = text.chars().take(SHOWN).collect();
     if text.chars().nth(SHOWN).is_some() {

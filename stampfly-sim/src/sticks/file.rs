@@ -1,4 +1,4 @@
-//! The table of a stick file: read with every error named by its line, and written again.
+//! The table of a stick file: parsing with line numbers in errors, and writing.
 
 use super::error::{StickError, StickErrorKind, clipped};
 use core::fmt;
@@ -8,13 +8,13 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-/// Most bytes of a file. An hour at 50 Hz with 90 bytes a line, rounded up.
+/// Largest size of a file, bytes: an hour at 50 Hz with 90 bytes per line, rounded up.
 pub const MOST_BYTES: usize = 16 << 20;
-/// Most rows of a file: an hour at 50 Hz, and a tenth more.
+/// Largest number of rows: an hour at 50 Hz plus a tenth.
 pub const MOST_ROWS: usize = 200_000;
-/// Most bytes of a line. Ten columns with every digit of a double are 250.
+/// Largest length of a line, bytes. Ten columns with all digits of a double need 250.
 pub const LONGEST_LINE: usize = 1_000;
-/// Latest time of a row, s.
+/// Largest time of a row, s.
 pub const LATEST: f64 = 3_600.0;
 
 /// Names of the flight modes in a file.
@@ -25,7 +25,7 @@ pub const MODES: [(&str, FlightMode); 4] = [
     ("poshold", FlightMode::PosHold),
 ];
 
-/// The flight mode of this name.
+/// The flight mode with this name.
 #[must_use]
 pub fn mode_named(name: &str) -> Option<FlightMode> {
     MODES.iter().find(|(known, _)| *known == name).map(|(_, mode)| *mode)
@@ -36,27 +36,27 @@ pub(super) fn name_of(mode: FlightMode) -> &'static str {
     MODES.iter().find(|(_, known)| *known == mode).map_or("", |(name, _)| name)
 }
 
-/// Every column: those that have to be there, then those that may be left out.
+/// All columns: required ones first, then optional ones.
 const COLUMNS: [&str; 10] = ["t", "throttle", "roll", "pitch", "yaw", "mode", "arm", "flip", "kill", "land"];
 const REQUIRED: usize = 7;
-/// Places of columns in [`COLUMNS`].
+/// Index of the mode in [`COLUMNS`].
 const MODE: usize = 5;
 
-/// The sticks and switches from an instant on.
+/// Stick and switch positions from an instant on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row {
-    /// Since the file's beginning.
+    /// Time since the beginning of the file.
     pub at: Duration,
     /// Sticks, mode, arm switch and kill switch.
     pub input: PilotInput,
-    /// Asks the vehicle to turn over, when it rises.
+    /// Requests a flip on its rising edge.
     pub flip: bool,
-    /// Asks the vehicle to land, when it rises.
+    /// Requests a landing on its rising edge.
     pub land: bool,
 }
 
-/// A stick file: rows in order of time, at least one. Rows that repeat the one above are left out,
-/// but for the last.
+/// A stick file: at least one row, in order of time. Rows that repeat the previous one are dropped,
+/// except for the last, which defines the length.
 ///
 /// ```
 /// use stampfly_sim::sticks::{StickErrorKind, StickFile};
@@ -77,20 +77,20 @@ impl StickFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// When it cannot be read, or what is in it is no stick file.
+    /// If the file cannot be read or is not a stick file.
     pub fn read(path: &Path) -> Result<Self, StickError> {
         let unreadable = |error: std::io::Error| StickErrorKind::Unreadable(error.to_string()).at(0);
         let mut bytes = Vec::new();
-        // A byte more than may be there tells that there are more.
+        // Reading one byte more than allowed shows whether the file is too large.
         let most = MOST_BYTES as u64 + 1;
         File::open(path).map_err(unreadable)?.take(most).read_to_end(&mut bytes).map_err(unreadable)?;
         Self::parse(&bytes)
     }
 
-    /// Reads what is in a file.
+    /// Parses the content of a file.
     ///
     /// # Errors
-    /// Names the line and what is wrong with it.
+    /// The line and the error in it.
     pub fn parse(bytes: &[u8]) -> Result<Self, StickError> {
         let mut lines = Lines { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), number: 0, taken: 0 };
         let header = lines.next().transpose()?;
@@ -104,6 +104,7 @@ impl StickFile {
                 let text = line.split(',').nth(place_of(&columns, 0)).unwrap_or_default();
                 return Err(StickErrorKind::GoesBack(clipped(text.trim())).at(number));
             }
+            // Held back: only the last repetition is kept, for the length of the file.
             if rows.last().is_some_and(|above| row.repeats(above)) {
                 held = Some(row);
             } else if rows.len() == MOST_ROWS {
@@ -117,7 +118,7 @@ impl StickFile {
         if rows.is_empty() { Err(StickErrorKind::NoRows.at(0)) } else { Ok(Self { rows }) }
     }
 
-    /// Sticks drawn from a seed: anywhere, in any mode, for 5 to 25 s, with the hover throttle at the
+    /// Sticks drawn from a seed: any position and mode, for 5 to 25 s, with hover throttle at the
     /// centre.
     ///
     /// ```
@@ -130,7 +131,7 @@ impl StickFile {
         Self { rows: super::drawn::rows(seed) }
     }
 
-    /// Its rows, in order of time. There is at least one.
+    /// The rows in order of time; at least one.
     #[must_use]
     pub fn rows(&self) -> &[Row] {
         &self.rows
@@ -148,7 +149,7 @@ impl StickFile {
         self.rows.last().copied().unwrap_or_default()
     }
 
-    /// The modes that its rows have, each once, in the order in which they come.
+    /// The modes of its rows, each once, in order of appearance.
     #[must_use]
     pub fn modes(&self) -> Vec<FlightMode> {
         let mut modes = Vec::new();
@@ -160,7 +161,7 @@ impl StickFile {
         modes
     }
 
-    /// Each row with how long it holds; the last one holds for no time.
+    /// Each row with its duration; that of the last row is 0.
     pub(super) fn spans(&self) -> impl Iterator<Item = (&Row, Duration)> {
         let next = self.rows.iter().skip(1).map(|row| row.at).chain([self.last().at]);
         self.rows
@@ -171,13 +172,13 @@ impl StickFile {
 }
 
 impl Row {
-    /// Is it the row above again, later?
+    /// True if it equals `above` except for the time.
     fn repeats(&self, above: &Self) -> bool {
         Self { at: above.at, ..*self } == *above
     }
 }
 
-/// The table, without columns that say nothing.
+/// Writes the table, without switch columns that are always 0.
 impl fmt::Display for StickFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let is_used = |used: fn(&Row) -> bool| self.rows.iter().any(used);
@@ -203,7 +204,7 @@ impl fmt::Display for StickFile {
     }
 }
 
-/// Lines that are not blank, with their numbers, from one.
+/// Iterator over lines that are not blank, with their numbers from 1.
 struct Lines<'a> {
     rest: &'a [u8],
     number: usize,
@@ -216,8 +217,8 @@ impl<'a> Iterator for Lines<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         while !self.rest.is_empty() {
             self.number += 1;
-            // No farther than a line may reach: one of a megabyte is refused without looking at all
-            // of it.
+            // The search is limited to the longest line, so that a line of megabytes is refused
+            // without scanning all of it.
             let head = self.rest.get(..=LONGEST_LINE).unwrap_or(self.rest);
             let end = head.iter().position(|byte| *byte == b'\n');
             if end.is_none() && head.len() > LONGEST_LINE {
@@ -240,7 +241,7 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// Which column stands at each place of a row, by its place in [`COLUMNS`].
+/// For each field of a row, the index of its column in [`COLUMNS`].
 fn columns(header: &str) -> Result<Vec<usize>, StickErrorKind> {
     let mut columns = Vec::new();
     for name in header.split(',').map(str::trim) {
@@ -257,7 +258,7 @@ fn columns(header: &str) -> Result<Vec<usize>, StickErrorKind> {
     }
 }
 
-/// Where a column stands in a row.
+/// Position of a column in a row.
 fn place_of(columns: &[usize], column: usize) -> usize {
     columns.iter().position(|known| *known == column).unwrap_or_default()
 }
@@ -287,7 +288,7 @@ fn read_row(columns: &[usize], line: &str) -> Result<Row, StickErrorKind> {
 }
 
 fn time(text: &str) -> Result<Duration, StickErrorKind> {
-    // Neither NaN nor infinity is in a range.
+    // NaN and infinity are in no range, so they are refused.
     let seconds = text.parse().ok().filter(|seconds: &f64| (0.0..=LATEST).contains(seconds));
     let seconds = seconds.ok_or_else(|| StickErrorKind::Number { column: COLUMNS[0], text: clipped(text) })?;
     Ok(Duration::from_micros((seconds * 1e6).round() as u64))

@@ -1,4 +1,4 @@
-//! Stick files: what a person's thumbs did, or are to do, for vehicles that are flown by sticks.
+//! Stick files: recorded or scripted stick input, for vehicles flown by sticks.
 //!
 //! ```text
 //! t,throttle,roll,pitch,yaw,mode,arm,land
@@ -9,28 +9,28 @@
 //! 15,0,0,0,0,althold,1,1
 //! ```
 //!
-//! | column | what it is |
+//! | column | content |
 //! |---|---|
-//! | `t` | seconds, from 0 to an hour; it never goes back. A row holds until the next one |
-//! | `throttle` | −1, the stick at its lowest, to 1 |
+//! | `t` | seconds, 0 to 3600, not descending. A row holds until the next one |
+//! | `throttle` | −1 (stick at its lowest) to 1 |
 //! | `roll`, `pitch`, `yaw` | −1 to 1: right, forward (nose down), clockwise seen from above |
 //! | `mode` | `stabilize`, `acro`, `althold` or `poshold` |
-//! | `arm` | the arm switch, 0 or 1 |
-//! | `flip`, `land` | may be left out: 0 or 1, and what rises to 1 asks the vehicle once |
-//! | `kill` | may be left out: the kill switch, on while 1 |
+//! | `arm` | arm switch, 0 or 1 |
+//! | `flip`, `land` | optional, 0 or 1: a rising edge is a request to the vehicle |
+//! | `kill` | optional: kill switch, on while 1 |
 //!
-//! Columns come in any order. Lines may end with CR LF, and a byte order mark is passed over.
+//! Columns may be in any order. Lines may end with CR LF; a byte order mark is ignored.
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! |---|---|
-//! | [`StickFile`], [`Row`] | the rows; reads and writes the table |
-//! | [`DRAWN`] | sticks that are drawn from a seed, in place of a file |
-//! | [`StickError`] | why a table is none, with the line |
-//! | [`Player`] | which row the transmitter sends when |
-//! | [`StickOptions`], [`Sticks`], [`Start`] | how a file is to be flown: as typed, and resolved for a vehicle |
-//! | [`Throttle`] | a throttle stick of one vehicle as that of another |
+//! | [`StickFile`], [`Row`] | the rows; parses and writes the table |
+//! | [`DRAWN`] | prefix that selects sticks drawn from a seed instead of a file |
+//! | [`StickError`] | error in a table, with its line |
+//! | [`Player`] | the row that the transmitter sends at an instant |
+//! | [`StickOptions`], [`Sticks`], [`Start`] | options of flying a file: as typed, and resolved for a vehicle |
+//! | [`Throttle`] | conversion of throttle between vehicles |
 //!
-//! Not for a vehicle that flies by itself: that has a mission.
+//! For a vehicle that flies autonomously use a mission instead.
 
 mod drawn;
 mod error;

@@ -1,4 +1,4 @@
-//! How a stick file is to be flown: as it is typed, and resolved for a vehicle.
+//! Options of flying a stick file: as typed, and resolved for a vehicle.
 
 use super::file::{Row, StickFile};
 use super::throttle::{self, Throttle};
@@ -8,71 +8,71 @@ use stampfly_types::Duration;
 use stampfly_types::messages::{FlightMode, PilotInput};
 use std::path::Path;
 
-/// Height at which a recording begins that begins in flight, m: a person's hover in a room.
+/// Default initial height of a recording that begins in flight, m: a typical hover in a room.
 pub const START_HEIGHT: f32 = 1.5;
-/// Lowest and highest height at which one may begin, m.
+/// Range of initial heights, m.
 const HEIGHTS: [f32; 2] = [0.3, 20.0];
-/// Farthest from the centre at which a vehicle may hover.
+/// Largest magnitude of a hover throttle.
 const HOVER: f32 = 0.9;
-/// A throttle stick below this is at its lowest: a trim and some noise above it.
+/// Throttle below which the stick counts as lowest, with a margin for trim and noise.
 const LOWEST: f32 = -0.9;
-/// A recording that begins on the ground has its throttle there for this long: many begin with the
-/// arming, a moment before the throttle is raised. A vehicle that is flown does not begin to fall.
+/// Time of lowest throttle that identifies a recording that begins on the ground. Many recordings
+/// begin with arming, shortly before the throttle is raised; in flight no recording begins with a
+/// fall.
 const LOW_FOR: Duration = Duration::from_millis(100);
-/// The hover throttle of a file, measured in it.
+/// Option value for a hover throttle measured in the file.
 const MEDIAN: &str = "median";
 
-/// `drawn:7` in place of a file are [sticks that are drawn](StickFile::drawn) from the seed 7.
+/// Prefix of a file name: `drawn:7` selects [sticks drawn](StickFile::drawn) from seed 7.
 pub const DRAWN: &str = "drawn:";
 
-/// How a stick file is to be flown, as it is typed.
+/// Options of flying a stick file, as typed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StickOptions {
-    /// A file; [`DRAWN`] and a seed; or what is in a file: a text of more than one line.
+    /// A file name; [`DRAWN`] and a seed; or the content of a file, recognised by a line break.
     pub file: String,
-    /// The vehicle's flight mode in place of the file's.
+    /// Flight mode that replaces the file's.
     pub mode: Option<String>,
-    /// Where a file that begins armed is to begin, m above the ground.
+    /// Initial height above the ground of a file that begins armed, m.
     pub from_height: Option<f32>,
-    /// The throttle with which the file's vehicle hovered in manual modes: a number, or `median`.
+    /// Throttle at which the file's vehicle hovered in manual modes: a number, or `median`.
     pub hover_throttle: Option<String>,
-    /// The file's time begins when the vehicle may be armed, and not at power-on.
+    /// The file starts when the vehicle is ready to arm instead of at power-on.
     pub when_ready: bool,
 }
 
-/// When and where a file begins.
+/// Start of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// With the vehicle's power: it begins disarmed.
+    /// At power-on. The file begins disarmed.
     PowerOn,
-    /// When the vehicle may be armed: it begins disarmed.
+    /// When the vehicle is ready to arm. The file begins disarmed.
     Ready,
-    /// On the ground, when the vehicle has been armed: it begins armed, with the throttle at its
-    /// lowest.
+    /// On the ground after arming. The file begins armed with lowest throttle.
     Armed,
-    /// In the air, at this height above the ground, m: it begins armed, with the throttle raised.
+    /// In the air at this height above the ground, m. The file begins armed with raised throttle.
     Height(f32),
 }
 
-/// A stick file for one vehicle.
+/// A stick file resolved for one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sticks {
-    /// What is played.
+    /// The file.
     pub file: StickFile,
-    /// The mode that is flown in place of the file's.
+    /// Flight mode that replaces the file's.
     pub mode: Option<FlightMode>,
-    /// When and where it begins.
+    /// Start of the file.
     pub start: Start,
-    /// What its throttle means.
+    /// Conversion of its throttle.
     pub throttle: Throttle,
 }
 
 impl StickOptions {
-    /// What is in the file.
+    /// The file's content.
     ///
     /// # Errors
-    /// When it is no stick file.
+    /// If it cannot be read or parsed.
     pub fn file(&self) -> Result<StickFile, SetupError> {
         if self.file.contains('\n') {
             return StickFile::parse(self.file.as_bytes()).map_err(|error| format!("--sticks: {error}"));
@@ -84,7 +84,7 @@ impl StickOptions {
         StickFile::read(Path::new(&self.file)).map_err(|error| format!("--sticks {}: {error}", self.file))
     }
 
-    /// The same flight in options that do not depend on the file.
+    /// The same options with the content of the file in place of its name.
     ///
     /// # Errors
     /// As [`file`](Self::file).
@@ -109,11 +109,11 @@ impl StickOptions {
 }
 
 impl Sticks {
-    /// What these options mean to a vehicle whose throttle stick is this. `mode` is the mode that
-    /// its options name.
+    /// Resolves the options for a vehicle with this throttle stick. `mode` is the flight mode in
+    /// its options.
     ///
     /// # Errors
-    /// When the file is none, or a number is out of its range.
+    /// If the file is invalid or a value is out of its range.
     pub fn new(options: &StickOptions, mode: Option<FlightMode>, throttle: Throttle) -> Result<Self, SetupError> {
         let file = options.file()?;
         let throttle = Throttle { of_file: options.hover(&file)?, ..throttle };
@@ -142,21 +142,21 @@ impl Sticks {
         self.mode.unwrap_or(row)
     }
 
-    /// Sticks of the file as this vehicle's transmitter sends them.
+    /// The file's sticks as this vehicle's transmitter sends them.
     #[must_use]
     pub fn sent(&self, input: &PilotInput) -> PilotInput {
         let mode = self.flown(input.mode);
         PilotInput { mode, throttle: self.throttle.sent(input.throttle, input.mode, mode), ..*input }
     }
 
-    /// How long the file is.
+    /// Length of the file.
     #[must_use]
     pub fn length(&self) -> Duration {
         self.file.last().at
     }
 }
 
-/// Is the throttle at its lowest from the first row on, for [`LOW_FOR`]?
+/// True if the throttle is lowest for [`LOW_FOR`] from the first row on.
 fn begins_low(file: &StickFile) -> bool {
     let begins = file.first().at;
     let first = |row: &&Row| row.at.as_micros() < begins.as_micros() + LOW_FOR.as_micros();

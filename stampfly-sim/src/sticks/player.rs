@@ -1,21 +1,21 @@
-//! Which row of a stick file the transmitter sends when.
+//! Plays a stick file as a transmitter sends it.
 
 use super::file::{Row, StickFile};
 use stampfly_types::Duration;
 use stampfly_types::messages::PilotInput;
 
-/// What a transmitter sends at an instant.
+/// Content of one transmitter frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// Sticks and switches. The kill switch is on when a row since the last frame had it on.
+    /// Sticks and switches. The kill switch is on if any row since the last frame had it on.
     pub input: PilotInput,
-    /// A row since the last frame asks to turn over.
+    /// A row since the last frame requests a flip.
     pub flip: bool,
-    /// One asks to land.
+    /// A row since the last frame requests a landing.
     pub land: bool,
 }
 
-/// Plays a file: asked for a frame now and then, it leaves no row out.
+/// Plays a file frame by frame. Events in rows between two frames are not lost.
 ///
 /// ```
 /// use stampfly_sim::sticks::{Player, StickFile};
@@ -37,18 +37,20 @@ pub struct Player<'f> {
 }
 
 impl<'f> Player<'f> {
-    /// At the file's beginning. Until the first row its sticks are held, with every switch off.
+    /// Starts at the beginning of the file. Until the first row, its sticks are sent with all
+    /// switches off.
     #[must_use]
     pub fn new(file: &'f StickFile) -> Self {
         let input = PilotInput { arm: false, kill: false, ..file.first().input };
         Self { rows: file.rows(), next: 0, held: Row { input, ..Row::default() } }
     }
 
-    /// The frame at this time since the file's beginning. Times do not go back.
+    /// The frame at this time since the beginning of the file. Call it with ascending times.
     pub fn at(&mut self, time: Duration) -> Frame {
         let mut frame = Frame { input: self.held.input, flip: false, land: false };
         let mut kill = false;
         while let Some(row) = self.rows.get(self.next).filter(|row| row.at <= time) {
+            // Rising edges between two frames are collected, so that a short pulse is not lost.
             frame.flip |= row.flip && !self.held.flip;
             frame.land |= row.land && !self.held.land;
             kill |= row.input.kill;
@@ -59,13 +61,13 @@ impl<'f> Player<'f> {
         frame
     }
 
-    /// Has the last row been sent?
+    /// True when the last row has been sent.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.next >= self.rows.len()
     }
 
-    /// Does a row to come turn the arm switch on?
+    /// True if a later row turns the arm switch on.
     #[must_use]
     pub fn arms_again(&self) -> bool {
         let mut before = self.held.input.arm;

@@ -1,26 +1,27 @@
-//! A throttle stick of one vehicle as that of another.
+//! Converts throttle between vehicles.
 //!
-//! In the modes whose throttle is a thrust, vehicles differ in the stick that carries them, and a
-//! recording is cut from a flight of another one. In the modes that hold their height, the centre
-//! does so on every vehicle.
+//! In manual modes throttle is thrust, and the stick position for hover depends on the vehicle; a
+//! recording may come from another one. In modes that hold height the centre holds it on every
+//! vehicle.
 
 use super::file::StickFile;
 use stampfly_types::messages::FlightMode;
 
-/// A hover that was measured is not nearer to an end of the stick than this: what is below it needs
-/// room.
+/// Least distance of a measured hover throttle from either end of the stick, so that both sides
+/// keep a range.
 const ROOM: f32 = 0.1;
-/// Below this a throttle is at rest: the vehicle stands, falls or coasts, and does not hover.
+/// Throttle below which the vehicle stands, falls or coasts, so that the row does not count for
+/// hover.
 const AT_REST: f32 = -0.95;
 
-/// What a vehicle's throttle stick means, and that of the vehicle in the file.
+/// Throttle stick of a vehicle, and that of the file's vehicle.
 ///
-/// | row of the file | flown in | throttle that is sent |
+/// | mode in the file | mode flown | throttle sent |
 /// |---|---|---|
-/// | a mode that holds height | such a mode | as it is |
-/// | a manual mode | a manual mode | as it is; with a hover of the file: lowest → no thrust, hover → hover, highest → highest |
-/// | a manual mode | a mode that holds height | no thrust → lowest, hover → centre, highest → highest |
-/// | a mode that holds height | a manual mode | lowest → no thrust, centre → hover, highest → highest |
+/// | holds height | holds height | unchanged |
+/// | manual | manual | unchanged; if the file's hover is known: lowest → no thrust, hover → hover, highest → highest |
+/// | manual | holds height | no thrust → lowest, hover → centre, highest → highest |
+/// | holds height | manual | lowest → no thrust, centre → hover, highest → highest |
 ///
 /// ```
 /// use stampfly_sim::sticks::Throttle;
@@ -34,17 +35,16 @@ const AT_REST: f32 = -0.95;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Throttle {
-    /// The highest stick that makes no thrust, in a manual mode of the vehicle.
+    /// Highest stick position without thrust in the vehicle's manual modes.
     pub rest: f32,
-    /// The stick with which it hovers there.
+    /// Stick position for hover in the vehicle's manual modes.
     pub hover: f32,
-    /// The stick with which the vehicle of the file hovered there; `None` for a file that was made
-    /// for this one.
+    /// Stick position at which the file's vehicle hovered; `None` for a file made for this vehicle.
     pub of_file: Option<f32>,
 }
 
 impl Throttle {
-    /// The stick of a row in this mode, when `flown` is the mode that is flown.
+    /// Converts the stick of a row with mode `of` that is flown in mode `flown`.
     #[must_use]
     pub fn sent(&self, stick: f32, of: FlightMode, flown: FlightMode) -> f32 {
         let own = [self.rest, self.hover, 1.0];
@@ -60,7 +60,7 @@ impl Throttle {
     }
 }
 
-/// Straight from one triple to the other; no farther than its ends.
+/// Piecewise linear map from one triple to the other, limited to its ends.
 fn between(stick: f32, [low, middle, high]: [f32; 3], [to_low, to_middle, to_high]: [f32; 3]) -> f32 {
     let share = |from: f32, to: f32| ((stick - from) / (to - from)).clamp(0.0, 1.0);
     if stick < middle {
@@ -70,9 +70,9 @@ fn between(stick: f32, [low, middle, high]: [f32; 3], [to_low, to_middle, to_hig
     }
 }
 
-/// The throttle with which the vehicle of a file hovered: the median, by time, of its armed rows in
-/// manual modes with the stick off its lowest. A vehicle that neither rises nor sinks over the
-/// whole flight has as much thrust as weight on the average. `None` when there is no such row.
+/// Estimates the hover throttle of a file: the time-weighted median over its armed rows in manual
+/// modes with raised throttle, since over a whole flight the mean thrust equals the weight. `None`
+/// without such rows.
 pub(super) fn median(file: &StickFile) -> Option<f32> {
     let flies = |throttle: f32, arm: bool, mode: FlightMode| arm && mode.is_manual() && throttle > AT_REST;
     let mut spans: Vec<(f32, u64)> = file

@@ -1,8 +1,8 @@
-//! The virtual clock and its only way of waiting.
+//! Virtual clock and its sleep future.
 //!
-//! A sleeping future leaves its deadline in a cell of the clock when it is polled; the executor reads that cell
-//! after the poll. Nothing is allocated, no list of timers is kept and no waker is called to sleep, which is
-//! what makes a thousand wakes per simulated second cost next to nothing.
+//! A sleeping future stores its deadline in a cell of the clock when it is polled, and the executor
+//! reads this cell after the poll. No allocation, timer list or waker is involved, so a thousand
+//! wakes per simulated second cost next to nothing.
 
 use core::cell::Cell;
 use core::future::Future;
@@ -16,7 +16,7 @@ use std::rc::Rc;
 #[derive(Debug)]
 struct State {
     now: Cell<Instant>,
-    /// Earliest deadline asked for since the executor last looked.
+    /// Earliest deadline requested since the executor last read it.
     wanted: Cell<Option<Instant>>,
 }
 
@@ -46,9 +46,9 @@ impl Clock {
         self.0.now.get()
     }
 
-    /// Moves the clock on. It never goes back: an earlier instant changes nothing.
+    /// Advances the clock. An earlier instant has no effect.
     ///
-    /// [`Tasks`](super::Tasks) calls this; call it yourself only where no executor runs.
+    /// [`Tasks`](super::Tasks) calls this; call it directly only without an executor.
     pub fn advance_to(&self, instant: Instant) {
         self.0.now.set(self.now().max(instant));
     }
@@ -58,7 +58,7 @@ impl Clock {
         Sleep { clock: self.clone(), deadline }
     }
 
-    /// The earliest deadline asked for since the last call.
+    /// Takes the earliest deadline requested since the last call.
     pub(super) fn take_wanted(&self) -> Option<Instant> {
         self.0.wanted.take()
     }
@@ -71,14 +71,15 @@ impl Timebase for Clock {
 }
 
 impl DelayNs for Clock {
-    /// Waits at least this long; the clock counts microseconds, so a fraction of one is a whole one.
+    /// Waits at least this long, rounded up to whole microseconds, the resolution of the clock.
     async fn delay_ns(&mut self, ns: u32) {
         self.sleep_until(self.now() + Duration::from_micros(u64::from(ns).div_ceil(1_000))).await;
     }
 }
 
 impl embedded_hal::delay::DelayNs for Clock {
-    /// Moves the clock on at once. Where other tasks share the clock they run late, as beside any blocking driver.
+    /// Advances the clock immediately. Other tasks on the same clock run late, as with any blocking
+    /// driver.
     fn delay_ns(&mut self, ns: u32) {
         self.advance_to(self.now() + Duration::from_micros(u64::from(ns).div_ceil(1_000)));
     }

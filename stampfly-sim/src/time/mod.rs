@@ -1,8 +1,9 @@
-//! Virtual time: a clock that only moves when told to, and an executor that tells it.
+//! Virtual time: a clock that only an executor advances, and that executor.
 //!
-//! Use [`Clock`] wherever a driver wants a [`Timebase`](stampfly_drivers::Timebase), and [`Tasks`] to run many
-//! `async` tasks on it, deterministically and as fast as the machine can. [`block_on`] runs a single future, for
-//! tests and examples. Not for real hardware: nothing here ever waits for the wall.
+//! Use [`Clock`] where a driver needs a [`Timebase`](stampfly_drivers::Timebase), and [`Tasks`] to
+//! run many `async` tasks on it, deterministically and as fast as the machine allows. [`block_on`]
+//! runs a single future, for tests and examples. Not for hardware: nothing here waits for
+//! wall-clock time.
 
 mod clock;
 mod tasks;

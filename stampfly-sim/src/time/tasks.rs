@@ -1,8 +1,9 @@
-//! A deterministic executor on virtual time.
+//! Deterministic executor on virtual time.
 //!
-//! It polls whatever is due at an instant and then jumps to the next one. Tasks that are due together run in the
-//! order of (deadline, spawning), so the same program always interleaves the same way. A task may also wait for
-//! another task, through any channel that uses wakers; it then runs again within the same instant.
+//! It polls all tasks that are due at an instant and then advances the clock to the next deadline.
+//! Tasks due at the same instant run in the order of (deadline, spawn), so the same program always
+//! interleaves the same way. A task may also wait for another task through any channel that uses
+//! wakers; it then runs again within the same instant.
 
 use super::Clock;
 use core::future::Future;
@@ -13,9 +14,9 @@ use stampfly_types::Instant;
 use std::sync::Arc;
 use std::task::Wake;
 
-/// A task's door bell: rung by whatever else than time the task waits for.
+/// Wake flag of a task, set by any event other than time.
 ///
-/// Atomic because [`Waker`] has to be `Send`; there is still only one thread.
+/// Atomic because [`Waker`] requires `Send`; there is only one thread.
 struct Bell {
     rung: AtomicBool,
     any_rung: Arc<AtomicBool>,
@@ -65,9 +66,10 @@ struct Task<'a> {
 pub struct Tasks<'a> {
     clock: Clock,
     tasks: Vec<Option<Task<'a>>>,
-    /// When each task is to be polled; [`NEVER`] when it does not wait for time.
+    /// Deadline of each task; [`NEVER`] for a task that does not wait for time.
     deadlines: Vec<Instant>,
-    /// The smallest (deadline, spawn order), looked for after each poll only: asked for several times as often.
+    /// The smallest (deadline, spawn order). Cached after each poll because it is read several
+    /// times as often.
     first: (Instant, usize),
     any_rung: Arc<AtomicBool>,
 }
@@ -76,14 +78,14 @@ pub struct Tasks<'a> {
 const NEVER: Instant = Instant::from_micros(u64::MAX);
 
 impl<'a> Tasks<'a> {
-    /// No tasks yet.
+    /// An executor without tasks.
     #[must_use]
     pub fn new(clock: Clock) -> Self {
         let (tasks, deadlines) = (Vec::new(), Vec::new());
         Self { clock, tasks, deadlines, first: (NEVER, 0), any_rung: Arc::new(AtomicBool::new(false)) }
     }
 
-    /// Adds a task. It is polled for the first time at the next step, at the instant the clock shows then.
+    /// Adds a task. It is first polled in the next step, at the instant the clock shows then.
     pub fn spawn(&mut self, future: impl Future<Output = ()> + 'a) {
         let bell = Arc::new(Bell { rung: AtomicBool::new(true), any_rung: self.any_rung.clone() });
         self.any_rung.store(true, Ordering::Relaxed);
@@ -92,19 +94,19 @@ impl<'a> Tasks<'a> {
         self.deadlines.push(NEVER);
     }
 
-    /// How many tasks have not finished.
+    /// Number of unfinished tasks.
     #[must_use]
     pub fn len(&self) -> usize {
         self.tasks.iter().flatten().count()
     }
 
-    /// Has every task finished?
+    /// True when all tasks have finished.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The instant of the next step; `None` when no task waits for time.
+    /// Instant of the next step; `None` if no task waits for time or has been woken.
     #[must_use]
     pub fn next_deadline(&self) -> Option<Instant> {
         let (deadline, _) = self.first;
@@ -114,9 +116,9 @@ impl<'a> Tasks<'a> {
         (deadline != NEVER).then_some(deadline)
     }
 
-    /// Runs everything that is due at the next deadline, and returns that instant.
+    /// Runs all tasks due at the next deadline and returns that instant.
     ///
-    /// `None`, and nothing done, when no task waits for time.
+    /// Returns `None` and does nothing if no task waits for time or has been woken.
     pub fn step(&mut self) -> Option<Instant> {
         self.clock.advance_to(self.next_deadline()?);
         self.answer_bells();
@@ -129,7 +131,7 @@ impl<'a> Tasks<'a> {
         Some(self.clock.now())
     }
 
-    /// Runs everything that is due up to and including `instant`, where the clock then stands.
+    /// Runs all tasks due up to and including `instant`, and leaves the clock there.
     pub fn run_until(&mut self, instant: Instant) {
         while self.next_deadline().is_some_and(|deadline| deadline <= instant) {
             self.step();
@@ -137,9 +139,9 @@ impl<'a> Tasks<'a> {
         self.clock.advance_to(instant);
     }
 
-    /// Polls the tasks that were woken by something else than time, in spawn order, until none is left.
+    /// Polls woken tasks in spawn order until none is woken.
     fn answer_bells(&mut self) {
-        // Loads, which cost nothing, before swaps: hardly ever has a bell rung.
+        // A load is cheaper than a swap, and wakes are rare.
         while self.any_rung.load(Ordering::Relaxed) && self.any_rung.swap(false, Ordering::Relaxed) {
             for index in 0..self.tasks.len() {
                 if self.tasks[index].as_ref().is_some_and(|task| task.bell.rung.swap(false, Ordering::Relaxed)) {
@@ -151,6 +153,7 @@ impl<'a> Tasks<'a> {
 
     fn poll(&mut self, index: usize) {
         let Some(task) = &mut self.tasks[index] else { return };
+        // Discards a deadline that a poll outside this executor has left.
         self.clock.take_wanted();
         match task.future.as_mut().poll(&mut Context::from_waker(&task.waker)) {
             Poll::Ready(()) => {
@@ -159,6 +162,8 @@ impl<'a> Tasks<'a> {
             }
             Poll::Pending => self.deadlines[index] = self.clock.take_wanted().unwrap_or(NEVER),
         }
+        // A linear search: there are few tasks, and the strict comparison keeps spawn order among
+        // equals.
         self.first = (NEVER, 0);
         for (index, deadline) in self.deadlines.iter().enumerate() {
             if *deadline < self.first.0 {
@@ -168,10 +173,10 @@ impl<'a> Tasks<'a> {
     }
 }
 
-/// Runs one future to its end, moving the clock from one of its deadlines to the next.
+/// Runs one future to completion, advancing the clock from deadline to deadline.
 ///
 /// # Panics
-/// When the future waits for something that is not the clock: nothing else could ever happen.
+/// If the future waits for anything other than the clock, since nothing could ever wake it.
 pub fn block_on<T>(clock: &Clock, future: impl Future<Output = T>) -> T {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());

@@ -1,11 +1,12 @@
-//! Other parameters for a vehicle in flight, as if they had been changed at that instant.
+//! Changes the parameters of a vehicle in flight, keeping its state.
 //!
-//! For tools that ask what would have come of it: the simulator flies up to an instant with some parameters, and on with others.
-//! The states stay: attitude, biases, integrals, phases. What a runnable holds of its configuration, or of what follows from it, is
-//! found by comparing the runnables at power-on with either configuration: where they differ, and the vehicle still has
-//! what it had at power-on, it gets the new value. Whatever has moved since then is a state, and stays.
+//! For tools that compare variants: the simulator flies up to an instant with one set of parameters
+//! and continues with another. States are kept: attitude, biases, integrators, phases. A value held
+//! by a runnable counts as configuration if the runnables made from the old and the new
+//! configuration differ in it and the flying vehicle still has the old value; it then gets the new
+//! value. A value that has changed since power-on counts as state.
 //!
-//! Not for a vehicle: it serialises all of its state.
+//! Not for flight code: the full state is serialised. On a vehicle use its parameter requests.
 
 use super::Witness;
 use ciborium::Value;
@@ -15,16 +16,16 @@ use stampfly_bus::Schedule;
 use stampfly_flight::{FlightLoop, Observer};
 use stampfly_types::Instant;
 
-/// Why the parameters of a vehicle in flight were not changed.
+/// Why the parameters of a flying vehicle were not changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ChangeError {
-    /// It chooses a component, which would begin without a state: the runnables have another structure with it, or the
-    /// [vehicle](super::Vehicle::has_same_components) says so.
+    /// The parameter selects a component, which would start without state: the serialised runnables
+    /// have another structure, or the [vehicle](super::Vehicle::has_same_components) reports it.
     OtherComponents,
-    /// It decides only how the vehicle begins: nothing in flight depends on it.
+    /// The parameter acts only at power-on: nothing in flight depends on it.
     NothingDepends,
-    /// The runnables do not survive being written down.
+    /// The runnables cannot be serialised and restored.
     NotSerialisable,
 }
 
@@ -40,16 +41,17 @@ impl fmt::Display for ChangeError {
 
 impl std::error::Error for ChangeError {}
 
-/// The runnables with the parameters of `new` instead of `old`, and their states. The same runnables bit for bit when both are
-/// the same.
+/// Returns the runnables with the parameters of `new` instead of `old`, and their states. If both
+/// are equal, the result equals `flying` bit for bit.
 ///
 /// # Errors
-/// When the change cannot be made in flight.
+/// If the change cannot be made in flight.
 pub fn carry_over<R: Schedule + Serialize + DeserializeOwned>(
     flying: &R,
     old: &R::Config,
     new: &R::Config,
 ) -> Result<R, ChangeError> {
+    // Comparing serialised trees needs no knowledge of the runnables' fields.
     let value = |runnables: &R| Value::serialized(runnables).map_err(|_| ChangeError::NotSerialisable);
     let (mut tree, old, new) = (value(flying)?, value(&R::new(old))?, value(&R::new(new))?);
     if patch(&mut tree, &old, &new)? == 0 && !same(&old, &new) {
@@ -58,14 +60,14 @@ pub fn carry_over<R: Schedule + Serialize + DeserializeOwned>(
     tree.deserialized().map_err(|_| ChangeError::NotSerialisable)
 }
 
-/// Returns how many values have changed.
+/// Replaces configuration values in `flying`; returns how many were replaced.
 fn patch(flying: &mut Value, old: &Value, new: &Value) -> Result<usize, ChangeError> {
     if same(old, new) {
         return Ok(0);
     }
     match (old, new) {
         (Value::Array(olds), Value::Array(news)) if olds.len() == news.len() => {
-            // A list that has grown since is a state.
+            // A list whose length has changed since power-on is a state.
             let Value::Array(parts) = flying else { return Ok(0) };
             if parts.len() != olds.len() {
                 return Ok(0);
@@ -98,7 +100,7 @@ fn keys(map: &[(Value, Value)]) -> impl Iterator<Item = &Value> {
     map.iter().map(|(key, _)| key)
 }
 
-/// Bit for bit: what is no number is the same as itself.
+/// Equality bit for bit, so that NaN equals itself.
 fn same(one: &Value, other: &Value) -> bool {
     match (one, other) {
         (Value::Float(one), Value::Float(other)) => one.to_bits() == other.to_bits(),
@@ -112,7 +114,8 @@ fn same(one: &Value, other: &Value) -> bool {
     }
 }
 
-/// Changes the configuration of a vehicle in flight at an instant. A [`Witness`] like a recorder: put it behind one.
+/// Changes the configuration of a flying vehicle at an instant. It is a [`Witness`]: pair it with a
+/// recorder.
 pub struct Change<R: Schedule> {
     at: Instant,
     old: R::Config,
@@ -121,13 +124,14 @@ pub struct Change<R: Schedule> {
 }
 
 impl<R: Schedule> Change<R> {
-    /// From the first moment of rest at or after `at`, the vehicle that flew with `old` flies with `new`.
+    /// Replaces `old` by `new` at the first turn at or after `at` in which no activation is
+    /// pending.
     #[must_use]
     pub fn new(at: Instant, old: R::Config, new: R::Config) -> Self {
         Self { at, old, new, made: None }
     }
 
-    /// When it was made, or why not; `None` when the flight was over before.
+    /// The instant of the change or the reason for failure; `None` if the flight ended before.
     #[must_use]
     pub const fn made(&self) -> Option<Result<Instant, ChangeError>> {
         self.made

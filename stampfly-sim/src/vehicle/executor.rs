@@ -1,11 +1,13 @@
-//! One flight on virtual time: drivers and pilots as tasks, the flight stack between them, everything witnessed.
+//! Runs one flight on virtual time: drivers and pilots as tasks, the flight stack as runnables, all
+//! events reported to a witness.
 //!
-//! One thread. Tasks run on the simulator's clock; the runnables run when the [flight loop](stampfly_flight::FlightLoop)
-//! says they are due. The same setup gives the same flight, bit for bit.
+//! Single-threaded. Tasks run on the simulator's clock; the [flight
+//! loop](stampfly_flight::FlightLoop) determines when runnables are due. The same setup gives the
+//! same flight bit for bit.
 //!
-//! With [`FlightOptions::jitter`] the flight band starts late by a seeded amount and interrupts background activations
-//! between reading and publishing, as a preemptive executor on two cores would: generations are skipped, and the log
-//! must still replay.
+//! With [`FlightOptions::jitter`] the flight band starts late by a seeded delay and interrupts
+//! background activations between reading and publishing, as a preemptive executor on two cores
+//! does. Readers then skip generations, and the log must still replay.
 
 use super::processor::{Here, Processor};
 use super::recording::{RecordRing, Taker};
@@ -17,33 +19,33 @@ use stampfly_bus::{Schedule, Taps, TopicTable};
 use stampfly_flight::Assembled;
 use stampfly_types::{Duration, Instant};
 
-/// How a flight is run.
+/// Options of the executor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlightOptions {
-    /// What the clock shows at power-on.
+    /// Time shown by the clock at power-on.
     pub start: Instant,
-    /// The flight is broken off after this long.
+    /// Longest duration; the flight is aborted after it.
     pub limit: Duration,
     /// Seed of the executor's delays; `None` for an executor that is never late.
     pub jitter: Option<u64>,
 }
 
-/// How a flight ended.
+/// Result of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ended<O> {
-    /// What the surroundings say of it.
+    /// Outcome, as the surroundings determine it.
     pub outcome: O,
-    /// Simulated time.
+    /// Simulated duration.
     pub duration: Duration,
-    /// Samples that the log's taps missed.
+    /// Samples lost by the log's taps.
     pub log_lost: u32,
 }
 
-/// Time between two calls of `report`.
+/// Simulated time between two calls of `report`.
 const REPORT_PERIOD: Duration = Duration::from_millis(100);
 
-/// Flies until the surroundings say that it is over, or the limit is reached. `report` is called about ten times a
-/// simulated second with the progress.
+/// Flies until the surroundings report the end or the limit is reached. Calls `report` with the
+/// progress ten times per simulated second.
 pub fn fly<R: Schedule + Serialize, S: Surroundings<Runnables = R>>(
     config: &R::Config,
     options: &FlightOptions,
@@ -68,12 +70,13 @@ pub fn fly<R: Schedule + Serialize, S: Surroundings<Runnables = R>>(
     }
 }
 
-/// As [`fly`], with the runnables on a vehicle at the other end of a line, which has been
-/// [greeted](Remote::greet). The same flight bit for bit, if both compute alike.
+/// As [`fly`], with the runnables on a vehicle at the other end of a line, to which the connection
+/// has been [opened](Remote::greet). The flight is the same bit for bit if both processors compute
+/// the same.
 ///
 /// # Errors
-/// When the vehicle refuses something or is lost; the flight is broken off. And for [`FlightOptions::jitter`], which is
-/// about an executor here.
+/// If the vehicle refuses a request or the connection is lost; the flight is aborted. Also with
+/// [`FlightOptions::jitter`], which only the local executor offers.
 pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
     config: &R::Config,
     options: &FlightOptions,
@@ -82,6 +85,7 @@ pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
     witness: &mut dyn Witness<R>,
     report: &mut dyn FnMut(f32, &'static str),
 ) -> Result<Ended<S::Outcome>, RemoteError> {
+    // The remote vehicle has an executor of its own.
     if options.jitter.is_some() {
         return Err(RemoteError::NotOffered("an executor that is late"));
     }
@@ -93,7 +97,7 @@ pub fn fly_remote<R: Schedule, S: Surroundings<Runnables = R>>(
     Ok(ended)
 }
 
-/// Flies on whatever runs the runnables.
+/// Flies with this processor of the runnables.
 fn fly_on<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>>(
     processor: P,
     outside: Outside<'b, R>,
@@ -116,7 +120,8 @@ fn fly_on<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>>(
     Ok(turns.end(witness))
 }
 
-/// A flight in this process, turn by turn, for a caller that cannot wait for its end: a page in a browser, a game's loop.
+/// A flight in this process, advanced turn by turn: for a caller that cannot block until its end,
+/// such as a page in a browser or a game loop.
 ///
 /// ```no_run
 /// use stampfly_bus::{Schedule, TopicTable};
@@ -134,7 +139,7 @@ fn fly_on<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>>(
 pub struct Flying<'b, R: Schedule, S: Surroundings<Runnables = R> + 'b>(Turns<'b, R, S, Here<'b, R>>);
 
 impl<'b, R: Schedule, S: Surroundings<Runnables = R>> Flying<'b, R, S> {
-    /// Switches the vehicle on.
+    /// Powers the vehicle on.
     pub fn begin(
         bus: &'b mut R::Topics,
         config: &R::Config,
@@ -147,7 +152,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>> Flying<'b, R, S> {
         Self(Turns::begin(here, outside, taps, options, surroundings, witness))
     }
 
-    /// Flies up to then. Is there more to fly?
+    /// Advances up to `until`. Returns false when the flight is over.
     pub fn go_on(&mut self, until: Instant, witness: &mut dyn Witness<R>) -> bool {
         while !self.0.is_over && self.0.clock.now() < until {
             match self.0.next(witness) {
@@ -158,7 +163,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>> Flying<'b, R, S> {
         !self.0.is_over
     }
 
-    /// What the clock shows.
+    /// The simulated time.
     #[must_use]
     pub fn now(&self) -> Instant {
         self.0.clock.now()
@@ -170,7 +175,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>> Flying<'b, R, S> {
     }
 }
 
-/// A flight, turn by turn.
+/// State of a flight between two turns of the executor.
 struct Turns<'b, R: Schedule, S: Surroundings<Runnables = R> + 'b, P: Processor<'b, R>> {
     processor: P,
     taps: <R::Topics as TopicTable>::Taps<'b>,
@@ -199,7 +204,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
         Self { processor, taps, tasks, around, clock, start, limit, is_over: false }
     }
 
-    /// One turn of the executor. Is there another?
+    /// One turn of the executor. Returns false when the flight is over.
     fn next(&mut self, witness: &mut dyn Witness<R>) -> Result<bool, P::Error> {
         let Self { processor, taps, tasks, around, clock, .. } = self;
         let deadlines = [tasks.next_deadline(), processor.deadline(clock.now())];
@@ -207,9 +212,10 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
             self.is_over = true;
             return Ok(false);
         };
+        // A deadline in the past belongs to a delayed executor: time does not go back.
         tasks.run_until(next.max(clock.now()));
         let now = clock.now();
-        // What came from outside is in the log before the activations that read it.
+        // Samples from outside reach the log before the activations that read them.
         drain(taps, processor, around, witness);
 
         witness.turn(now);
@@ -217,6 +223,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
         around.show(now);
         drain(taps, processor, around, witness);
         witness.lost(now, taps.lost());
+        // Changes from outside go in before the key frame, which then contains them.
         if let Some((flight_loop, mut record)) = processor.at_rest() {
             if around.tend(flight_loop, &mut record) {
                 witness.replaced(now);
@@ -229,6 +236,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
 
     fn end(self, witness: &mut dyn Witness<R>) -> Ended<S::Outcome> {
         let Self { mut processor, mut taps, tasks, mut around, clock, start, .. } = self;
+        // Drivers and pilots stop first, so that nothing is published after the last turn.
         drop(tasks);
         if processor.end(witness) {
             drain(&mut taps, &mut processor, &mut around, witness);
@@ -238,7 +246,7 @@ impl<'b, R: Schedule, S: Surroundings<Runnables = R>, P: Processor<'b, R>> Turns
     }
 }
 
-/// Passes on what was published.
+/// Passes published samples to the witness, the processor and the surroundings.
 fn drain<'b, R: Schedule>(
     taps: &mut impl Taps,
     processor: &mut impl Processor<'b, R>,

@@ -1,10 +1,10 @@
-//! An executor that is late: seeded delays, as on a processor with other work to do.
+//! Seeded delays of the executor, as on a processor with other work.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stampfly_types::Duration;
 
-/// How late the executor is, drawn from a seed; never late without one.
+/// Source of delays; without a seed all are zero.
 pub(super) struct Jitter {
     random: Option<ChaCha8Rng>,
 }
@@ -14,7 +14,8 @@ impl Jitter {
         Self { random: seed.map(ChaCha8Rng::seed_from_u64) }
     }
 
-    /// Delay of the flight band: mostly some 100 µs, one time in twenty several milliseconds.
+    /// Delay of the flight band: usually up to 300 µs, in three cases of twenty up to 2 ms, in one
+    /// of twenty 2 to 8 ms.
     pub(super) fn flight(&mut self) -> Duration {
         let Some(random) = &mut self.random else { return Duration::ZERO };
         let draw = u64::from(random.next_u32());
@@ -25,7 +26,8 @@ impl Jitter {
         })
     }
 
-    /// Time between reading and publishing of a background activation.
+    /// Time between reading and publishing of a background activation: up to 500 µs, one time in
+    /// ten up to 10 ms.
     pub(super) fn background(&mut self) -> Duration {
         let Some(random) = &mut self.random else { return Duration::ZERO };
         let draw = u64::from(random.next_u32());

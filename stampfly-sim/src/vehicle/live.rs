@@ -1,12 +1,12 @@
-//! A vehicle in the hands of other programs, in real time or slower or faster.
+//! Connects a simulated vehicle to other programs in real time, slower or faster.
 //!
-//! Virtual time waits for the wall: the task [`Live::serve`] holds the whole simulation until a
-//! tick's time has come, and hears meanwhile what arrives. Ticks that come late keep the plan, up to
-//! a quarter of a second; after a longer stop the plan begins anew. What is published is in the
-//! log, so the flight can be replayed without the programs.
+//! Virtual time follows the wall clock: the task [`Live::serve`] blocks the simulation until a tick
+//! is due and receives from the ports meanwhile. Late ticks catch up to the schedule within a
+//! quarter of a second; after a longer stop the schedule starts again. All published samples are
+//! logged, so the flight can be replayed without the programs.
 //!
-//! A vehicle lists its ports ([`PortSpec`]); the program that flies it opens them ([`Ports`]), and
-//! the vehicle makes of the bytes what it wants ([`Link`]). No socket is known here.
+//! A vehicle lists its ports ([`PortSpec`]), the program that flies it opens them ([`Ports`]), and
+//! the vehicle interprets the bytes ([`Link`]). This module opens no socket.
 
 use crate::time::Clock;
 use core::fmt;
@@ -15,91 +15,91 @@ use stampfly_types::{Duration, Instant};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// In a pause, programs are heard this often.
+/// Longest time without receiving while simulated time is paused.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
-/// Between a tick and its answers: the executor has run it by then.
+/// Delay from a tick to the answers: the executor has run the tick by then.
 const AFTER_TICK: Duration = Duration::from_millis(1);
 
-/// How bytes come to a port.
+/// Transport of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// Datagrams come to it, and answers go from it.
+    /// Receives datagrams, and answers from the same port.
     Udp,
-    /// Datagrams are sent to it, whether or not somebody listens, and answers are heard.
+    /// Sends datagrams to a fixed address, whether or not a receiver exists, and receives the
+    /// answers.
     UdpTo,
-    /// Programs connect to it.
+    /// Accepts connections.
     Tcp,
-    /// A serial port that exists in this machine alone: a pseudo-terminal.
+    /// A pseudo-terminal: a serial port visible on this machine only.
     Terminal,
-    /// A page in a browser, which the program that flies the vehicle serves for all vehicles
-    /// together.
+    /// A page in a browser, served for all vehicles by the program that flies them.
     Page,
 }
 
-/// The language of a port. A stream whose first bytes are of another one is ended before anything
-/// is made of it: a web page can open a stream to any port of the machine that shows it, and say
-/// what it likes behind the head of its request.
+/// Protocol of a port. A stream whose first bytes belong to another protocol is closed before they
+/// are interpreted: a web page can open a stream to any port of the machine that displays it, and
+/// send arbitrary text after the head of its request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speech {
-    /// MAVLink: frames from the first byte on.
+    /// MAVLink frames from the first byte on.
     Mavlink,
-    /// MSP: frames from the first byte on.
+    /// MSP frames from the first byte on.
     Msp,
-    /// Lines that a person types.
+    /// Text lines typed by a user.
     Text,
-    /// What a board speaks on USB: frames of MAVLink, and lines that a person types.
+    /// As a board on USB: MAVLink frames and text lines.
     Cable,
-    /// HTTP, which its server judges.
+    /// HTTP, checked by its server.
     Http,
-    /// Datagrams, each of which is judged by itself.
+    /// Datagrams, each checked separately.
     Datagrams,
 }
 
-/// What stops others than programs on this machine at a port.
+/// Protection of a port against programs on other machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
-    /// Nothing: the vehicle only sends there.
+    /// None: the vehicle only sends.
     SendsOnly,
-    /// The key: what is not signed or sealed with it does nothing. Without a key the port is not
-    /// opened for others.
+    /// The key: messages that are not signed or sealed with it have no effect. Without a key the
+    /// port is not opened to other machines.
     Key,
-    /// A secret in the address of the page, which is made from the key. Without a key the port is
-    /// not opened for others.
+    /// A secret in the address of the page, derived from the key. Without a key the port is not
+    /// opened to other machines.
     Secret,
-    /// The language has no room for a key: the port is on this machine alone.
+    /// The protocol has no place for a key: the port is open on this machine only.
     Loopback,
 }
 
-/// A port of a vehicle.
+/// Specification of one port of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortSpec {
-    /// Name, as options take it.
+    /// Name used by options.
     pub name: &'static str,
-    /// How bytes come to it.
+    /// Transport.
     pub transport: Transport,
-    /// Its number, unless another is asked for. Of the n-th vehicle from zero: ten times n more,
-    /// but for [`Transport::UdpTo`] and [`Transport::Page`].
+    /// Default number. The n-th vehicle, counted from zero, adds ten times n, except for
+    /// [`Transport::UdpTo`] and [`Transport::Page`].
     pub number: u16,
-    /// What is spoken there.
+    /// Description of the protocol, for display.
     pub meaning: &'static str,
-    /// What a program there may do.
+    /// Description of permitted actions, for display.
     pub may: &'static str,
-    /// Its language.
+    /// Protocol.
     pub speech: Speech,
-    /// What stops others.
+    /// Protection against other machines.
     pub guard: Guard,
-    /// Is it opened only when an option names it?
+    /// Opened only if an option names it.
     pub when_named: bool,
 }
 
-/// What is said at ports that others can reach is signed with this.
+/// Signing data of ports that other machines can reach.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Signing {
-    /// The key that both ends share.
+    /// The shared key.
     pub key: [u8; 32],
-    /// The pass-phrase of stations that speak MAVLink, which is made of the key.
+    /// The MAVLink pass-phrase derived from the key.
     pub phrase: String,
-    /// The time at which it is asked for, in MAVLink's units: 10 µs since 2015 began.
+    /// Present time in MAVLink's unit: 10 µs since the beginning of 2015.
     pub time: u64,
 }
 
@@ -109,42 +109,41 @@ impl fmt::Debug for Signing {
     }
 }
 
-/// What a station with the key may do.
+/// Permitted actions of a station with the key.
 const STATION: &str = "fly; with motors off everything that the console does";
-/// What configurators may do.
+/// Permitted actions of configurators.
 const TUNE: &str = "read its state, change gains";
-/// What a program may do at a port, unless another thing is said of it.
+/// Default of permitted actions.
 const FLY: &str = "fly, change parameters";
 
 impl PortSpec {
-    /// The page of a ground station.
+    /// The ground station's page.
     pub const PAGE: Self = Self {
         transport: Transport::Page,
         guard: Guard::Secret,
         may: "fly, change parameters, calibrate, turn motors, inject faults, take the log",
         ..Self::tcp("http", 8_080, Speech::Http, "the ground station, in a browser")
     };
-    /// Where ground stations expect MAVLink to be sent to.
+    /// MAVLink, sent to the port on which ground stations listen.
     pub const MAVLINK_UDP: Self = Self {
         transport: Transport::UdpTo,
         guard: Guard::Key,
         ..Self::udp("mavlink-udp", 14_550, "MAVLink, for ground stations")
     };
-    /// Where programs connect for MAVLink.
+    /// MAVLink for programs that connect.
     pub const MAVLINK_TCP: Self = Self {
         guard: Guard::Key,
         ..Self::tcp("mavlink-tcp", 5_760, Speech::Mavlink, "MAVLink, for programs that connect")
     };
-    /// Where a station with the vehicle's key speaks in sealed frames. Without a key nothing is
-    /// heard there, and it is not opened.
+    /// Sealed frames of a station with the vehicle's key. Without a key the port is not opened.
     pub const SEALED: Self = Self {
         guard: Guard::Key,
         may: STATION,
         ..Self::udp("sealed", 14_560, "sealed frames of a station with the key")
     };
-    /// Where configurators connect for MSP.
+    /// MSP for configurators that connect.
     pub const MSP: Self = Self { may: TUNE, ..Self::tcp("msp", 5_761, Speech::Msp, "MSP, for configurators") };
-    /// The same for programs that open a serial port.
+    /// MSP for configurators that open a serial port.
     pub const MSP_SERIAL: Self = Self {
         name: "msp-serial",
         transport: Transport::Terminal,
@@ -153,14 +152,14 @@ impl PortSpec {
         ..Self::MSP
     };
 
-    /// A port that datagrams come to, on this machine alone.
+    /// A port that receives datagrams, on this machine only.
     #[must_use]
     pub const fn udp(name: &'static str, number: u16, meaning: &'static str) -> Self {
         let (transport, speech, guard) = (Transport::Udp, Speech::Datagrams, Guard::Loopback);
         Self { name, transport, number, meaning, may: FLY, speech, guard, when_named: false }
     }
 
-    /// A port that programs connect to, on this machine alone.
+    /// A port that accepts connections, on this machine only.
     #[must_use]
     pub const fn tcp(name: &'static str, number: u16, speech: Speech, meaning: &'static str) -> Self {
         let (transport, guard) = (Transport::Tcp, Guard::Loopback);
@@ -168,120 +167,121 @@ impl PortSpec {
     }
 }
 
-/// Who speaks: a program at one of the vehicle's ports.
+/// A program at one of the vehicle's ports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Client {
-    /// Place of the port in [`Vehicle::PORTS`](super::Vehicle::PORTS).
+    /// Index of the port in [`Vehicle::PORTS`](super::Vehicle::PORTS).
     pub port: usize,
-    /// Where the program is. Unlike every other at this port.
+    /// Address of the program, unique at this port.
     pub address: SocketAddr,
 }
 
-/// What is heard of a program.
+/// An event at a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard<'b> {
-    /// It has connected; at a port of [`Transport::UdpTo`], the address to which datagrams are to
-    /// be sent.
+    /// The program has connected. At a port of [`Transport::UdpTo`]: the address to which datagrams
+    /// are sent.
     Opened,
     /// A datagram, or the next part of a stream.
     Bytes(&'b [u8]),
-    /// The same, which has waited for the vehicle for more than a second: what it asks for is not
-    /// wanted any more, but for landing and for motors off.
+    /// Bytes that have waited for the vehicle for more than a second. Requests in them are
+    /// obsolete, except for landing and stopping the motors.
     Late(&'b [u8]),
-    /// It is gone.
+    /// The program has disconnected.
     Closed,
 }
 
 /// The open ports of one vehicle.
 pub trait Ports: fmt::Debug + Send + Sync {
-    /// Hands over what has come in, in order, and waits for more until then, if at all; a bounded
-    /// number, so that a flood does not hold time up.
+    /// Passes received events to `hear` in order, and waits for more until `until` if given.
+    /// Bounded in number, so that a flood does not stall simulated time.
     fn receive(&self, until: Option<std::time::Instant>, hear: &mut dyn FnMut(Client, Heard<'_>));
 
-    /// Sends. Never waits: what cannot be sent is lost, as on any network, and a stream that takes
-    /// nothing is closed.
+    /// Sends without blocking. Datagrams that cannot be sent are lost, and a stream that accepts no
+    /// data is closed.
     fn send(&self, to: &Client, bytes: &[u8]);
 
-    /// Tells every page what happens to the vehicle. Nothing by default.
+    /// Reports an event of the vehicle to all pages. Does nothing by default.
     fn tell(&self, _text: &str) {}
 
-    /// Tells every page who commands, in words, and the number of its page if it is one. Empty when
-    /// no program does. Nothing by default.
+    /// Reports the program in command to all pages: its description, and its page number if it is a
+    /// page. Empty if no program is in command. Does nothing by default.
     fn tell_commander(&self, _who: &str, _page: Option<u32>) {}
 
-    /// This program has signed with the key that its port asks for: others make room for it.
-    /// Nothing by default.
+    /// Marks a program as authenticated: it has signed with the key of its port. Unauthenticated
+    /// programs are dropped first when connections run out. Does nothing by default.
     fn believe(&self, _client: &Client) {}
 
-    /// Do only programs on this machine reach that port?
+    /// True if only programs on this machine reach the port.
     fn is_local(&self, _port: usize) -> bool {
         true
     }
 
-    /// What is said at the other ports is signed with, if with anything.
+    /// Signing data of the other ports, if any.
     fn signing(&self) -> Option<Signing> {
         None
     }
 
-    /// Has somebody asked for the end of the flight?
+    /// True if the end of the flight has been requested.
     fn are_closed(&self) -> bool;
 }
 
-/// Where other programs reach a vehicle, and for how long.
+/// Connection of one vehicle to other programs.
 #[derive(Clone, Debug)]
 pub struct Live {
-    /// Where they are heard and answered.
+    /// The open ports.
     pub ports: Arc<dyn Ports>,
-    /// Which of several vehicles this is, from zero.
+    /// Number of this vehicle among several, from zero.
     pub number: usize,
-    /// The flight is broken off after this long, in virtual time.
+    /// Longest duration in virtual time; the flight is aborted after it.
     pub limit: Duration,
-    /// How fast time passes. `None` where somebody else sees to that, and nothing here may wait.
+    /// Speed of virtual time. `None` if the caller paces it; then nothing here blocks.
     pub speed: Option<Speed>,
 }
 
-/// Virtual seconds in a second of the wall: 1 is real time, 0 is a pause. A handle: clones share
-/// it.
+/// Virtual seconds per second of wall-clock time: 1 is real time, 0 a pause. A handle: clones share
+/// the value.
 #[derive(Clone, Debug)]
 pub struct Speed(Arc<AtomicU32>);
 
 impl Speed {
-    /// This fast.
+    /// A speed with this factor.
     #[must_use]
     pub fn new(factor: f32) -> Self {
         Self(Arc::new(AtomicU32::new(factor.to_bits())))
     }
 
-    /// How fast.
+    /// The factor.
     #[must_use]
     pub fn get(&self) -> f32 {
         f32::from_bits(self.0.load(Ordering::Relaxed))
     }
 
-    /// From now on this fast.
+    /// Changes the factor.
     pub fn set(&self, factor: f32) {
         self.0.store(factor.to_bits(), Ordering::Relaxed);
     }
 }
 
-/// Where answers go.
+/// Callback that sends bytes to a client.
 pub type Put<'p> = &'p mut dyn FnMut(&Client, &[u8]);
 
-/// What a vehicle makes of what it hears.
+/// Protocol handler of a vehicle.
 pub trait Link {
-    /// Something was heard.
+    /// Handles an event at a port. Answers go to `put`.
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>);
 
-    /// A tick has run.
+    /// Called after each tick has run, to send periodic data to `put`.
     fn answer(&mut self, now: Instant, tick: u32, put: Put<'_>);
 }
 
 impl Live {
-    /// Connects a vehicle to other programs, tick by tick, the first one period after the clock's
-    /// zero.
+    /// Serves the ports tick by tick. The first tick comes one period after the present multiple of
+    /// the period.
     pub async fn serve(&self, clock: Clock, period: Duration, mut link: impl Link) {
         let ports = &self.ports;
         let mut pace = self.speed.as_ref().map(|speed| Pace::new(speed, period));
+        // Ticks are multiples of the period since zero, whenever serving begins.
         let begun = clock.now().as_micros() / period.as_micros();
         for tick in 1_u32.. {
             let due = period.as_micros() * (begun + u64::from(tick));
@@ -295,13 +295,14 @@ impl Live {
                 Some(pace) => pace.wait(&mut |until| hear(Some(until)), &|| ports.are_closed()),
                 None => hear(None),
             }
+            // Other tasks and the executor run at the tick's instant before the answers are read.
             clock.sleep_until(clock.now() + AFTER_TICK).await;
             link.answer(clock.now(), tick, &mut |to, bytes| ports.send(to, bytes));
         }
     }
 }
 
-/// Holds virtual time to the wall's.
+/// Holds virtual time to wall-clock time.
 struct Pace<'s> {
     speed: &'s Speed,
     period: std::time::Duration,
@@ -314,7 +315,7 @@ impl<'s> Pace<'s> {
         Self { speed, period, until: std::time::Instant::now() }
     }
 
-    /// Waits for the next tick, and has programs heard meanwhile.
+    /// Waits for the next tick and receives meanwhile.
     fn wait(&mut self, hear: &mut dyn FnMut(std::time::Instant), are_closed: &dyn Fn() -> bool) {
         let speed = loop {
             let speed = self.speed.get();
@@ -325,10 +326,10 @@ impl<'s> Pace<'s> {
                 return;
             }
             hear(std::time::Instant::now() + PAUSE);
-            // A pause is not made up for.
+            // The schedule continues from the end of a pause, without catching up.
             self.until = std::time::Instant::now();
         };
-        // A speed of a hundred thousandth is none.
+        // Avoids a division by a vanishing speed.
         let period = self.period.div_f32(speed.max(1e-5));
         self.until = next_tick(self.until, std::time::Instant::now(), period);
         hear(self.until);
@@ -336,12 +337,13 @@ impl<'s> Pace<'s> {
     }
 }
 
-/// Greatest delay that later ticks make up for. A busy machine runs a thread late by tens of
-/// milliseconds, and stations count on from the vehicle's clock. Ticks that catch up hear no new
-/// sticks, so all of them together stay below the 500 ms after which vehicles call a link silent.
+/// Greatest delay that later ticks catch up. A busy machine delays a thread by tens of
+/// milliseconds, and stations extrapolate the vehicle's clock. No new sticks are received while
+/// catching up, so the limit is below the 500 ms after which vehicles declare a link lost.
 const MADE_UP: std::time::Duration = std::time::Duration::from_millis(250);
 
-/// When the next tick is due: a period after the one before, or earlier than now when that was late.
+/// Instant of the next tick: one period after the last, or now if that is more than [`MADE_UP`]
+/// ago.
 fn next_tick(last: std::time::Instant, now: std::time::Instant, period: std::time::Duration) -> std::time::Instant {
     let planned = last + period;
     if now.saturating_duration_since(planned) > MADE_UP { now } else { planned }

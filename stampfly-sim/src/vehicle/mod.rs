@@ -1,18 +1,18 @@
-//! A whole vehicle in simulation: its flight stack, and what is around it.
+//! A complete vehicle in simulation: its flight stack and its surroundings.
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! |---|---|
-//! | [`Vehicle`] | what a vehicle tells the programs that fly it: its runnables, options, surroundings, verdict |
-//! | [`Surroundings`], [`Around`] | the world, the drivers and the pilot of one flight |
-//! | [`fly`], [`Flying`] | one flight on virtual time, at once or turn by turn |
-//! | [`Remote`], [`fly_remote`] | the same with the runnables on a vehicle at the other end of a line |
-//! | [`Script`], [`Scripted`] | surroundings without a world: only who drives, and a judge |
-//! | [`Scenario`] | what to command and what must be true, as text |
-//! | [`Live`], [`Ports`], [`Link`] | other programs fly it, in real time |
-//! | [`change`] | other parameters for a vehicle in flight |
-//! | [`Witness`] | is told everything that happens: a log, a hash, a test |
+//! | [`Vehicle`] | interface between a vehicle and the programs that fly it: runnables, options, surroundings, verdict |
+//! | [`Surroundings`], [`Around`] | world, drivers and pilot of one flight |
+//! | [`fly`], [`Flying`] | one flight on virtual time, in one call or turn by turn |
+//! | [`Remote`], [`fly_remote`] | the same with the runnables on hardware at the other end of a line |
+//! | [`Script`], [`Scripted`] | surroundings without a world, for a vehicle that simulates its own dynamics |
+//! | [`Scenario`] | commands and checks as text |
+//! | [`Live`], [`Ports`], [`Link`] | connection to other programs in real time |
+//! | [`change`] | new parameters for a vehicle in flight |
+//! | [`Witness`] | observer of all events of a flight: log, hash, test |
 //!
-//! A program that flies vehicles (missions, campaigns, replay, report) knows them through [`Vehicle`] alone, so a new
+//! Programs that fly vehicles (missions, campaigns, replay, report) use [`Vehicle`] only. A new
 //! vehicle is a type that implements it.
 
 pub mod change;
@@ -50,55 +50,61 @@ use stampfly_flight::{FlightLoop, flight_loop};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_types::Instant;
 
-/// The ends of everybody outside a vehicle's runnables.
+/// Bus ends of all participants outside a vehicle's runnables.
 pub type Outside<'b, R> = <<R as Schedule>::Topics as TopicTable>::Outside<'b>;
 
-/// What is around a vehicle: everything that lives for one flight and that tasks may borrow.
+/// Surroundings of a vehicle: owns everything that lives for one flight and that tasks may borrow.
 pub trait Surroundings {
     /// The vehicle's runnables.
     type Runnables: Schedule;
-    /// How a flight went.
+    /// Result of a flight.
     type Outcome;
-    /// What the executor calls while it flies.
+    /// The part that the executor calls during the flight.
     type Around<'a>: Around<Runnables = Self::Runnables, Outcome = Self::Outcome>
     where
         Self: 'a;
 
-    /// The clock that everything here shares.
+    /// The clock shared by everything in these surroundings.
     fn clock(&self) -> Clock;
 
-    /// May somebody there want the compact record of the flight, as at a vehicle's port, and what is the vehicle's name in it? Asked before the flight. A
-    /// [witness](Witness::record_of) that wants it has it alone.
+    /// The vehicle's name in the compact record if a participant here may request that record, as
+    /// at a vehicle's port. Called before the flight. If a [witness](Witness::record_of) takes the
+    /// record, these surroundings do not receive it.
     fn record_of(&self) -> Option<&'static str> {
         None
     }
 
-    /// Starts the tasks of drivers, links and pilots, and hands each the ends it owns.
+    /// Starts the tasks of drivers, links and pilots, and gives each the bus ends that it owns.
     fn start<'a>(&'a mut self, tasks: &mut Tasks<'a>, outside: Outside<'a, Self::Runnables>) -> Self::Around<'a>;
 }
 
-/// What is around a vehicle, as the executor sees it during a flight.
+/// Surroundings during a flight, as the executor calls them.
 pub trait Around {
     /// The vehicle's runnables.
     type Runnables: Schedule;
-    /// How the flight went.
+    /// Result of the flight.
     type Outcome;
 
-    /// The flight band has run: hands its outputs to the actuators.
+    /// Called after the flight band has run: passes its outputs to the actuators.
     fn drive(&mut self, now: Instant);
 
-    /// Is this band's processor held up, so that nothing of the band runs now? Never by default.
+    /// True while the processor of this band is stalled, so that no runnable of the band runs.
+    /// Never by default.
     fn is_held_up(&mut self, _band: Band, _now: Instant) -> bool {
         false
     }
 
-    /// A turn of the executor has ended: hands slower outputs on (lights, sound). Nothing by default.
+    /// Called at the end of each executor turn: passes on slower outputs (lights, sound). Does
+    /// nothing by default.
     fn show(&mut self, _now: Instant) {}
 
-    /// A sample was published, by whomever.
+    /// Called for every published sample, whether a runnable or an outside participant published
+    /// it.
     fn published(&mut self, _topic: usize, _at: Instant, _words: &[u32]) {}
 
-    /// A moment of rest: puts into the vehicle what somebody has changed of it, and tells the observer. Was there something? A log says so. Nothing by default.
+    /// Called when no activation is pending: applies changes made from outside to the vehicle and
+    /// reports them to the observer. Returns true if anything was changed, which the log then
+    /// records. Does nothing by default.
     fn tend(
         &mut self,
         _flight_loop: &mut FlightLoop<'_, Self::Runnables>,
@@ -107,36 +113,39 @@ pub trait Around {
         false
     }
 
-    /// The compact record, at the end of every turn, if it [may be wanted](Surroundings::record_of): whoever takes it says so there.
+    /// Called at the end of every turn with the compact record, if
+    /// [requested](Surroundings::record_of). The receiver says through `chunks` whether it wants
+    /// the record.
     fn stream(&mut self, _now: Instant, _chunks: &mut dyn Chunks) {}
 
-    /// Everything published so far has been passed on. Hands samples that belong into the log but are on no topic (the
-    /// truth) to `record`: place in [`Vehicle::BESIDE`], instant, generation, words.
+    /// Called after all samples published so far have been passed on. Hands samples that are logged
+    /// but are not on a topic (the truth) to `record`: index in [`Vehicle::BESIDE`], instant,
+    /// generation, words.
     fn beside(&mut self, _record: &mut dyn FnMut(usize, Instant, u32, &[u32])) {}
 
-    /// What is going on, for a progress bar: the share that is done, and a word.
+    /// Progress for a progress bar: the share done, 0 to 1, and a word for the current activity.
     fn progress(&self) -> (f32, &'static str);
 
-    /// Is there nothing more to fly?
+    /// True when there is nothing more to fly.
     fn is_over(&mut self, now: Instant) -> bool;
 
-    /// How the flight went.
+    /// Result of the flight.
     fn finish(self) -> Self::Outcome;
 }
 
-/// One figure of a flight: name, unit, value; `None` where the flight had no such phase.
+/// One figure of a flight. The value is `None` if the flight had no such phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figure {
-    /// Name with its unit, as scripts use it: `pos_rms_m`.
+    /// Unit, for display.
     pub name: &'static str,
-    /// Unit, for people.
+    /// Value in that unit.
     pub unit: &'static str,
     /// The value.
     pub value: Option<f64>,
 }
 
 impl Figure {
-    /// The name for people: words, and no unit, which stands beside it.
+    /// The name for display: words without the unit.
     ///
     /// ```
     /// use stampfly_sim::vehicle::Figure;
@@ -151,57 +160,59 @@ impl Figure {
     }
 }
 
-/// How a flight of a vehicle went, as programs report it.
+/// Verdict on a flight, as programs report it.
 pub trait Verdict {
-    /// Did the vehicle do what it was to do, without ever doing what it must not?
+    /// True if the vehicle fulfilled its task and violated no rule. By default all
+    /// [facts](Self::facts) have to hold.
     fn succeeded(&self) -> bool {
         self.facts().iter().all(|(_, holds)| *holds)
     }
 
-    /// Yes-or-no results by name, for scripts: `landed`, `disarmed`. All hold in a flight that succeeded.
+    /// Boolean results by name, for scripts: `landed`, `disarmed`. All hold in a successful flight.
     fn facts(&self) -> Vec<(&'static str, bool)>;
 
-    /// The figures, the same names in the same order for every flight of the vehicle.
+    /// The figures: the same names in the same order for every flight of the vehicle.
     fn figures(&self) -> Vec<Figure>;
 
-    /// What came of faults, or whatever else scripts want to know: fields of the JSON object that describes the flight.
+    /// Further fields of the JSON object that describes the flight, such as the effect of faults.
     /// None by default.
     fn findings(&self) -> impl Serialize {
         NoFindings {}
     }
 
-    /// What else people want to read after a flight, one line each: phases, extremes.
+    /// Further lines for display after a flight: phases, extremes.
     fn story(&self) -> Vec<String>;
 
-    /// One sentence.
+    /// The verdict in one sentence.
     fn sentence(&self) -> String;
 
-    /// Files that belong to the flight beside its log and report: name and contents. None by default.
+    /// Additional files of the flight next to its log and report: name and contents. None by
+    /// default.
     fn files(&self) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 }
 
-/// [`Verdict::findings`] of a vehicle that has none.
+/// [`Verdict::findings`] of a vehicle without findings.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct NoFindings {}
 
-/// Why a flight cannot be set up: a sentence for whoever typed the options.
+/// Why a flight cannot be set up: a sentence for the user who gave the options.
 pub type SetupError = String;
 
-/// How kind the world is to a flight.
+/// Kind of world in which a flight takes place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WorldKind {
-    /// [`Conditions::GENTLE`](crate::Conditions::GENTLE).
+    /// [`Conditions::GENTLE`](crate::Conditions::GENTLE): neutral conditions.
     #[default]
     Gentle,
-    /// [`Conditions::harsh`](crate::Conditions::harsh), of each flight's seed.
+    /// [`Conditions::harsh`](crate::Conditions::harsh), drawn from each flight's seed.
     Harsh,
 }
 
 impl WorldKind {
-    /// Its name, as it is typed.
+    /// Its name on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -233,62 +244,65 @@ impl core::str::FromStr for WorldKind {
     }
 }
 
-/// Options of a flight as they are typed. A vehicle refuses what it has no use for.
+/// Options of a flight, as given on the command line. A vehicle refuses options that it does not
+/// support.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Options {
-    /// A mission: a built-in name or a file.
+    /// A mission: the name of a built-in one, or a file.
     pub mission: Option<String>,
-    /// `NAME=VALUE` of the simulated vehicle or its surroundings.
+    /// `NAME=VALUE` of the simulated vehicle or its conditions.
     pub plant: Vec<String>,
-    /// How kind the world is. What [`plant`](Self::plant) names it does not decide.
+    /// Kind of world. Values given in [`plant`](Self::plant) take precedence.
     #[serde(skip_serializing_if = "WorldKind::is_gentle")]
     pub world: WorldKind,
     /// `NAME=VALUE` of the flight stack's parameters.
     pub param: Vec<String>,
-    /// Strength of vibration; 1 is what was recorded.
+    /// Amplitude of vibration relative to the recorded flights.
     pub vibration: Option<f64>,
     /// Standard deviation of gusts, m/s.
     pub gust: Option<f32>,
     /// Mean wind towards north and east, m/s.
     pub wind: Option<[f32; 2]>,
-    /// Run the real drivers over emulated chips.
+    /// Run the real drivers on emulated chips.
     pub chips: bool,
-    /// Let a motion capture system watch.
+    /// Add a motion capture system.
     pub cameras: bool,
-    /// Seed of the executor's delays.
+    /// Seed of the executor's delays; without it the executor is never late.
     pub jitter: Option<u64>,
-    /// Faults, as [`Fault::parse`](crate::fault::Fault::parse) reads them.
+    /// Faults in the syntax of [`Fault::parse`](crate::fault::Fault::parse).
     pub fault: Vec<String>,
-    /// Fly with a pilot's sticks, in this flight mode; empty is the vehicle's own choice.
+    /// Fly with a model pilot on the sticks, in this flight mode; empty selects the vehicle's
+    /// default.
     pub pilot: Option<String>,
-    /// Fly what is in a stick file.
+    /// Fly a stick file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sticks: Option<StickOptions>,
-    /// Fly on where a protection stops the motors in the air: to find out whether that was right. A
-    /// simulator's option alone.
+    /// Continue to fly where a protection would stop the motors in the air, to find out whether
+    /// stopping was right. Exists in simulation only.
     #[serde(skip_serializing_if = "core::ops::Not::not")]
     pub flies_on: bool,
-    /// Fly what other programs ask for; not written down, because it is not repeatable.
+    /// Fly what other programs request. Not serialised, because such a flight is not repeatable.
     #[serde(skip)]
     pub live: Option<Live>,
 }
 
 impl Options {
-    /// The faults, as this vehicle's table has them.
+    /// The faults, parsed with this vehicle's table.
     ///
     /// # Errors
-    /// When one is not in the table, or not as the table says.
+    /// If a fault is not in the table, or its value or moment is not allowed there.
     pub fn faults(&self, table: &'static [FaultKind]) -> Result<Vec<Fault>, SetupError> {
         let faults = self.fault.iter().map(|text| Fault::parse(text, table));
         faults.collect::<Result<_, _>>().map_err(|error| format!("--fault {error}"))
     }
 
-    /// Changes of the world what these options say of it: how kind it is, vibration, wind, gusts, the simulated vehicle. The seed is the
-    /// simulation's.
+    /// Applies these options to the simulation: kind of world, vibration, wind, gusts, parameters
+    /// of the simulated vehicle. The seed remains that of the simulation.
     ///
     /// # Errors
-    /// When a number makes no sense, or has no name, or when the numbers are no vehicle together.
+    /// If a value is out of range, a name is unknown, or the parameters together do not describe a
+    /// vehicle that can be simulated.
     pub fn change<A: Airframe>(&self, simulation: &mut SimulationConfig<A>) -> Result<(), SetupError> {
         if self.world == WorldKind::Harsh {
             *simulation = simulation.clone().in_harsh_world();
@@ -308,14 +322,14 @@ impl Options {
             let (name, value) = assignment(text)?;
             simulation.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
-        // In any order, so what they are together is looked at when all are there.
+        // Parameters come in any order, so combinations are checked after the last one.
         simulation.check().map_err(|error| format!("--plant {error}"))
     }
 
-    /// Names and values of [`param`](Self::param).
+    /// Names and values in [`param`](Self::param).
     ///
     /// # Errors
-    /// When one is not `NAME=VALUE`.
+    /// If an entry is not `NAME=VALUE`.
     pub fn parameters(&self) -> Result<Vec<(&str, f32)>, SetupError> {
         let pairs = self.param.iter().map(|text| {
             let pair = text.split_once('=').and_then(|(name, value)| Some((name.trim(), value.trim().parse().ok()?)));
@@ -325,7 +339,7 @@ impl Options {
     }
 }
 
-/// The value, if it is a number in its range.
+/// Returns the value if it is within its range; NaN is not.
 fn within<T: PartialOrd + fmt::Display>(name: &str, value: T, low: T, high: T) -> Result<T, SetupError> {
     if low <= value && value <= high { Ok(value) } else { Err(format!("{name} {value} is not from {low} to {high}")) }
 }
@@ -337,55 +351,55 @@ fn assignment(text: &str) -> Result<(&str, f64), SetupError> {
     Ok((name.trim(), value))
 }
 
-/// One number that options can change.
+/// A parameter that options can change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// Name, as `--plant` or `--param` takes it.
     pub name: &'static str,
-    /// Value now.
+    /// Present value.
     pub value: f64,
     /// SI unit.
     pub unit: &'static str,
-    /// What it does.
+    /// Its effect.
     pub meaning: &'static str,
 }
 
-/// What the flights of a campaign vary.
+/// Dimensions along which the flights of a campaign vary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Variety {
-    /// Flight modes of a pilot, as [`Options::pilot`] takes them.
+    /// Flight modes of the model pilot, as for [`Options::pilot`].
     pub modes: &'static [&'static str],
-    /// Missions, as [`Options::mission`] takes them; the first is short and has every usual moment
-    /// at which a fault can begin.
+    /// Missions, as for [`Options::mission`]. The first is short and contains every usual moment at
+    /// which a fault can begin.
     pub missions: &'static [&'static str],
-    /// Missions for the moments that do not come in those, in the order in which they are looked
-    /// through for one.
+    /// Missions for the other moments, searched in this order for the one that contains the moment.
     pub occasions: &'static [&'static str],
-    /// Faults that begin at a time begin within these, s since power-on: from before the vehicle is armed until the shortest mission is about to land.
+    /// Range of begin times of faults that begin at a time, s since power-on: from before arming
+    /// until just before the shortest mission lands.
     pub times: [u16; 2],
-    /// Can the real drivers run over emulated chips?
+    /// The real drivers can run on emulated chips.
     pub chips: bool,
 }
 
 impl Variety {
-    /// Nothing is varied.
+    /// No variation.
     pub const NONE: Self = Self { modes: &[], missions: &[], occasions: &[], times: [3, 12], chips: false };
 }
 
-/// A vehicle's golden flight: how it is flown, and how its record is judged.
+/// A vehicle's golden flight: its setup and the limits for comparison with its record.
 pub struct Golden<V: Vehicle + ?Sized> {
-    /// The flight, as short as can be.
+    /// The flight, as short as possible.
     pub setup: V::Setup,
-    /// The record that the program carries.
+    /// The record embedded in the program.
     pub record: &'static [u8],
-    /// The topic whose numbers are compared.
+    /// The topic whose values are compared.
     pub output: usize,
-    /// Largest deviation of a number that may still be rounding.
+    /// Largest deviation of a value that rounding may cause.
     pub tolerance: f32,
-    /// The sensor that activates the flight band. Now and then all other topics `sensor_…` are new at once, which is what a
-    /// step costs most.
+    /// The sensor topic that activates the flight band. From time to time all other `sensor_…`
+    /// topics have new samples in the same pass, which is the most expensive case.
     pub leading: usize,
-    /// When the vehicle last changed its state.
+    /// Instant of the vehicle's last state change.
     pub settled: fn(&V::Outcome) -> Option<Instant>,
 }
 
@@ -395,37 +409,37 @@ pub trait Vehicle: 'static {
     const NAME: &'static str;
     /// Topics that its surroundings add to the log. None by default.
     const BESIDE: &'static [Topic] = &[];
-    /// What can go wrong in its flights. None by default.
+    /// Faults that can be injected into its flights. None by default.
     const FAULTS: &'static [FaultKind] = &[];
-    /// What the flights of a campaign vary. Nothing by default.
+    /// Variation in campaigns. None by default.
     const VARIETY: Variety = Variety::NONE;
-    /// Where other programs reach it while it is live. Nowhere by default.
+    /// Ports at which other programs reach it while it is live. None by default.
     const PORTS: &'static [PortSpec] = &[];
-    /// What a page may ask of it while it is live, of [`ask::NAMES`]. Everything by default.
+    /// Requests that a page may make while it is live, from [`ask::NAMES`]. All by default.
     const ASKS: &'static [&'static str] = ask::NAMES;
-    /// What a page about a flight shows of it. By default a plot per topic and unit.
+    /// Layout of the page about a flight. By default a plot per topic and unit.
     const PAGE: Page = Page::EMPTY;
-    /// Its runnables. Serialisable, so that a log can hold key frames.
+    /// Its runnables. Serialisable, so that a log can contain key frames.
     type Runnables: Schedule + Serialize + DeserializeOwned;
-    /// All that decides a flight.
+    /// Everything that determines a flight.
     type Setup: Clone + Send + Sync;
-    /// How a flight went.
+    /// Result of a flight.
     type Outcome: Verdict + Send;
 
-    /// The flight that options and a seed describe.
+    /// The flight that these options and this seed describe.
     ///
     /// # Errors
-    /// When an option is wrong, or of no use to this vehicle.
+    /// If an option is invalid or not supported by this vehicle.
     fn setup(options: &Options, seed: u64) -> Result<Self::Setup, SetupError>;
 
-    /// The flight after this one, when somebody has asked the vehicle to restart. Never by default.
+    /// The next flight, if the vehicle was asked to restart. None by default.
     #[must_use]
     fn again(_setup: &Self::Setup, _outcome: &Self::Outcome) -> Option<Self::Setup> {
         None
     }
 
-    /// The same flight in options that do not depend on files, for a log: whoever has the log can fly it again. By default the
-    /// options as they are.
+    /// The same flight in options without references to files, for a log, so that the log alone
+    /// suffices to repeat it. By default the options unchanged.
     ///
     /// # Errors
     /// As [`setup`](Self::setup).
@@ -433,24 +447,25 @@ pub trait Vehicle: 'static {
         Ok(options.clone())
     }
 
-    /// How the executor flies it.
+    /// Executor options of the flight.
     fn options(setup: &Self::Setup) -> FlightOptions;
 
-    /// The configuration of its flight stack.
+    /// Configuration of its flight stack.
     fn config(setup: &Self::Setup) -> &<Self::Runnables as Schedule>::Config;
 
-    /// Flies it in its surroundings, with [`fly`]. Written out for each vehicle, so that its whole flight is
-    /// compiled once, in its own crate, and not again in every program and test.
+    /// Flies it in its surroundings with [`fly`]. Each vehicle implements it, so that its whole
+    /// flight is compiled once, in its own crate, instead of in every program and test.
     fn fly(
         setup: &Self::Setup,
         witness: &mut dyn Witness<Self::Runnables>,
         report: &mut dyn FnMut(f32, &'static str),
     ) -> Ended<Self::Outcome>;
 
-    /// Flies it in its surroundings with its runnables at the other end of a line, with [`fly_remote`].
+    /// Flies it in its surroundings with its runnables at the other end of a line, with
+    /// [`fly_remote`].
     ///
     /// # Errors
-    /// As [`fly_remote`]; by default, that this vehicle does not offer it.
+    /// As [`fly_remote`]. By default [`RemoteError::NotOffered`].
     fn fly_remote(
         _setup: &Self::Setup,
         _remote: &mut Remote<'_>,
@@ -460,29 +475,30 @@ pub trait Vehicle: 'static {
         Err(RemoteError::NotOffered("hardware in the loop for this vehicle"))
     }
 
-    /// The flight stack's configuration when nothing is changed.
+    /// Default configuration of the flight stack.
     fn default_config() -> <Self::Runnables as Schedule>::Config;
 
-    /// Every parameter of a configuration.
+    /// All parameters of a configuration.
     fn parameters(config: &<Self::Runnables as Schedule>::Config) -> Vec<Setting>;
 
-    /// Changes a parameter, as a log or an option says.
+    /// Sets a parameter, as a log or an option gives it.
     ///
     /// # Errors
-    /// When there is no such parameter, or the value is out of range.
+    /// If no parameter has this name or the value is out of range.
     fn set_parameter(
         config: &mut <Self::Runnables as Schedule>::Config,
         name: &str,
         value: ParameterValue,
     ) -> Result<(), SetupError>;
 
-    /// Lowest and highest value of a parameter, for people who choose one; `None` where the vehicle does not say.
+    /// Range of a parameter for display; `None` if the vehicle does not define it.
     fn parameter_range(_name: &str) -> Option<[f64; 2]> {
         None
     }
 
-    /// Do both configurations fly with the same components? One that begins has no state, so it cannot take over in flight. They do by default;
-    /// components that the runnables' structure shows need no word here.
+    /// True if both configurations use the same components. A component that is started in flight
+    /// has no state and cannot take over. True by default; differences visible in the structure of
+    /// the serialised runnables need not be reported here.
     fn has_same_components(
         _one: &<Self::Runnables as Schedule>::Config,
         _other: &<Self::Runnables as Schedule>::Config,
@@ -490,24 +506,25 @@ pub trait Vehicle: 'static {
         true
     }
 
-    /// Its golden flight, if it has one.
+    /// Its golden flight. None by default.
     fn golden() -> Option<Golden<Self>> {
         None
     }
 
-    /// The moments that come in a flight of these options when nothing goes wrong, in their order.
-    /// By default the usual ones.
+    /// The moments that occur in a fault-free flight of these options, in order. By default the
+    /// usual ones.
     fn moments(_options: &Options, _seed: u64) -> Vec<Moment> {
         Moment::USUAL.to_vec()
     }
 
-    /// Missions that are over earlier than the one of these options, as [`Options::mission`] takes them, shortest first: for
-    /// looking for the smallest flight in which something happens. None by default.
+    /// Missions shorter than the one of these options, as for [`Options::mission`], shortest first:
+    /// for shrinking a failing flight. None by default.
     fn shorter_missions(_options: &Options, _seed: u64) -> Vec<String> {
         Vec::new()
     }
 
-    /// Every number of the simulated vehicle and its surroundings that options can change. None by default.
+    /// All parameters of the simulated vehicle and its conditions that options can change. None by
+    /// default.
     fn plant(_setup: &Self::Setup) -> Vec<Setting> {
         Vec::new()
     }

@@ -1,31 +1,31 @@
-//! What a page about a flight shows of a vehicle: its plots, its states over time, and its body in space.
+//! Layout of the page about a flight: plots, states over time, and the vehicle's body.
 //!
-//! All of it is data that names topics and columns. What a flight does not have is left out; topics that no line of this
-//! names get a plot per unit, so that a page is never empty.
+//! Data only: it names topics and columns. Topics that a flight does not contain are skipped.
+//! Topics not named here get a plot per unit, so a page is never empty.
 
 use stampfly_types::messages::CalibrationKind;
 
-/// What a page shows of a vehicle.
+/// Layout of the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Page {
-    /// Topics that say where the vehicle is, the main one first.
+    /// Topics with the vehicle's position, the main one first.
     pub observers: &'static [Observer],
-    /// The topic that says where it should be; its column `axes` masks the others.
+    /// Topic with the position setpoint; its column `axes` masks inactive axes.
     pub setpoint: Option<&'static str>,
-    /// The plots beside those of position, velocity and attitude.
+    /// Plots in addition to those of position, velocity and attitude.
     pub panels: &'static [PanelSpec],
-    /// States over time: topic, column with named values, title.
+    /// State bands over time: topic, column with named values, title.
     pub bands: &'static [(&'static str, &'static str, &'static str)],
-    /// The topic and column of a set of alerts.
+    /// Topic and column of the alert set.
     pub alerts: Option<(&'static str, &'static str)>,
-    /// Calibrations that it offers, and the console line that begins each.
+    /// Calibrations offered, and the console line that starts each.
     pub calibrations: &'static [(CalibrationKind, &'static str)],
-    /// What the vehicle looks like.
+    /// Shape of the vehicle.
     pub body: Body,
 }
 
 impl Page {
-    /// A plot per topic and unit.
+    /// No layout: a plot per topic and unit.
     pub const EMPTY: Self = Self {
         observers: &[],
         setpoint: None,
@@ -37,51 +37,52 @@ impl Page {
     };
 }
 
-/// A topic that says where the vehicle is.
+/// A topic with the vehicle's position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {
     /// The topic.
     pub topic: &'static str,
-    /// The colour's name: `estimate`, `truth`, `device`.
+    /// Name of the colour: `estimate`, `truth`, `device`.
     pub role: &'static str,
-    /// For the legend.
+    /// Name in the legend.
     pub name: &'static str,
-    /// How its columns say it.
+    /// Format of its columns.
     pub motion: Motion,
 }
 
-/// How a topic says where the vehicle is.
+/// Format of a position topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Columns `position`, `velocity` (north, east, down) and `attitude` (body to earth).
     Space,
-    /// A vehicle on level ground: columns `x` forward of the start, `y` left of it, `yaw` counter-clockwise.
+    /// Motion on level ground: columns `x` forward of the start, `y` left of it, `yaw`
+    /// counter-clockwise.
     Plane,
 }
 
 /// One plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PanelSpec {
-    /// Heading under which it stands.
+    /// Heading of its group.
     pub group: &'static str,
     /// Title.
     pub title: &'static str,
-    /// Unit after the lines' factors.
+    /// Unit after multiplication by `factor`.
     pub unit: &'static str,
-    /// The topic of its lines.
+    /// Topic of its lines.
     pub topic: &'static str,
     /// Column and name of each line.
     pub lines: &'static [(&'static str, &'static str)],
-    /// What the values are multiplied by.
+    /// Factor on all values.
     pub factor: f64,
-    /// How several samples become one point.
+    /// Reduction of several samples to one point.
     pub pick: Pick,
-    /// A line that should not be crossed; the plot is logarithmic then.
+    /// Limit line. With a limit the plot is logarithmic.
     pub limit: Option<f64>,
 }
 
 impl PanelSpec {
-    /// A plot of these columns of a topic: newest values, as they are.
+    /// A plot of these columns of a topic: newest values, factor 1.
     #[must_use]
     pub const fn new(
         group: &'static str,
@@ -93,52 +94,52 @@ impl PanelSpec {
         Self { group, title, unit, topic, lines, factor: 1.0, pick: Pick::Newest, limit: None }
     }
 
-    /// The same with values in another unit.
+    /// Multiplies the values by a factor.
     #[must_use]
     pub const fn times(self, factor: f64) -> Self {
         Self { factor, ..self }
     }
 
-    /// The same with another way to make one point of several samples.
+    /// Sets the reduction of samples.
     #[must_use]
     pub const fn picking(self, pick: Pick) -> Self {
         Self { pick, ..self }
     }
 
-    /// The same, logarithmic, with a line at the limit.
+    /// Makes the plot logarithmic with a limit line.
     #[must_use]
     pub const fn limited(self, limit: f64) -> Self {
         Self { limit: Some(limit), ..self }
     }
 }
 
-/// How several samples, or none, between two points of a plot become one value.
+/// Reduction of the samples between two points of a plot to one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pick {
-    /// The newest one, as long as it is fresh.
+    /// The newest sample if it is fresh.
     Newest,
-    /// The newest one, however old: for states that are published when they change.
+    /// The newest sample regardless of age: for states published on change.
     Latched,
-    /// The mean, for fast and noisy signals.
+    /// The mean: for fast and noisy signals.
     Mean,
-    /// The one farthest from zero: for what must not be overlooked.
+    /// The sample farthest from zero: for peaks that must remain visible.
     Peak,
 }
 
-/// The vehicle in space: body frame forward, right, down, m.
+/// Shape of the vehicle in the body frame (forward, right, down), m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Body {
     /// Centres of rotors or wheels, drawn as rings.
     pub rings: &'static [[f32; 3]],
     /// Radius of a ring.
     pub radius: f32,
-    /// Outline of the middle, forward and right.
+    /// Outline of the fuselage, forward and right.
     pub outline: &'static [[f32; 2]],
-    /// Height of outline and rings above the origin, as a negative number.
+    /// Down coordinate of outline and rings: negative above the origin.
     pub down: f32,
-    /// How far the line that points forward reaches.
+    /// Length of the line that marks the nose.
     pub nose: f32,
-    /// Half the size of it all: how large it is drawn.
+    /// Half of the overall size; it scales the drawing.
     pub reach: f32,
 }
 

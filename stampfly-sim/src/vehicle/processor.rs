@@ -1,4 +1,4 @@
-//! What runs the runnables of a flight: a flight loop here, or a vehicle at the other end of a line.
+//! Processor of a flight's runnables: a local flight loop, or a vehicle at the other end of a line.
 
 use super::jitter::Jitter;
 use super::recording::{RecordRing, Recording, Taker};
@@ -9,29 +9,30 @@ use stampfly_flight::{FlightLoop, Observer, Pending};
 use stampfly_types::{Duration, Instant};
 use std::convert::Infallible;
 
-/// What the executor asks of it.
+/// Interface between the executor and the processor.
 pub(super) trait Processor<'b, R: Schedule> {
-    /// Why it cannot go on.
+    /// Reason to abort the flight.
     type Error;
 
-    /// The next instant after this one at which it has something to do by itself.
+    /// The next instant after `now` at which the processor acts without new samples.
     fn deadline(&self, now: Instant) -> Option<Instant>;
 
-    /// A sample was published, by whomever.
+    /// Called for every published sample.
     fn published(&mut self, topic: usize, at: Instant, words: &[u32]);
 
-    /// A turn of the executor: runs what is due, and has the outputs handed on.
+    /// One executor turn: runs due activations and lets `around` pass on the outputs.
     fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>)
     -> Result<(), Self::Error>;
 
-    /// The vehicle, when nothing is pending and its state is known here, and what is told when something of it is replaced.
+    /// The flight loop if no activation is pending and its state is local, with the observer to
+    /// notify of replacements.
     fn at_rest(&mut self) -> Option<(&mut FlightLoop<'b, R>, impl Observer)>;
 
-    /// The flight is over. Was something pending, which has been finished?
+    /// Ends the flight. Returns true if a pending activation was finished.
     fn end(&mut self, witness: &mut dyn Witness<R>) -> bool;
 }
 
-/// A flight loop in this process, and an executor that may be late.
+/// A local flight loop with an executor that may be late.
 pub(super) struct Here<'b, R: Schedule> {
     flight_loop: FlightLoop<'b, R>,
     jitter: Jitter,
@@ -45,7 +46,7 @@ impl<'b, R: Schedule> Here<'b, R> {
         Self { flight_loop, jitter: Jitter::new(jitter), flight_at: None, interrupted: None, recording: None }
     }
 
-    /// The same, with a compact record of the flight under this name.
+    /// Adds a compact record of the flight under this name.
     pub(super) fn recorded(self, ring: &'b mut RecordRing, taker: (Taker, &'static str)) -> Self
     where
         R: Serialize,
@@ -60,9 +61,9 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
 
     fn deadline(&self, now: Instant) -> Option<Instant> {
         let deadlines = [
-            // A tick that has passed is waiting for an executor that is late.
+            // A past tick is already waiting for the delayed executor.
             self.flight_loop.next_tick().filter(|tick| *tick > now),
-            // One that has passed waits for a processor that is held up.
+            // A past start is waiting for a stalled processor.
             self.flight_at.filter(|at| *at > now),
             self.interrupted.as_ref().map(|(at, _)| *at),
         ];
@@ -73,10 +74,12 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
 
     fn turn(&mut self, now: Instant, around: &mut impl Around, witness: &mut dyn Witness<R>) -> Result<(), Infallible> {
         let Self { flight_loop, jitter, flight_at, interrupted, recording } = self;
+        // The compact record observes activations together with the witness.
         let outer = witness;
         let mut observers = (recording.as_ref().map(Recording::watching), &mut *outer);
         let witness = &mut observers;
         let held_up = around.is_held_up(Band::Flight, now);
+        // The delay is drawn once per due pass, not at every turn.
         if flight_at.is_none() && flight_loop.is_due(Band::Flight, now) {
             *flight_at = Some(now + jitter.flight());
         }
@@ -92,6 +95,8 @@ impl<'b, R: Schedule> Processor<'b, R> for Here<'b, R> {
             None => {
                 while let Some(pending) = flight_loop.start_next(Band::Background, now, witness) {
                     let takes = jitter.background();
+                    // The activation has read its inputs; it publishes when the delay is over, with
+                    // newer samples on the bus by then.
                     if takes > Duration::ZERO {
                         *interrupted = Some((now + takes, pending));
                         break;

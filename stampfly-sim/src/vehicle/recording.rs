@@ -1,4 +1,4 @@
-//! The compact record of a flight here, as a vehicle streams it.
+//! Compact record of a local flight, as a vehicle streams it.
 
 use serde::Serialize;
 use stampfly_bus::{AnyTopic, Schedule, TopicTable};
@@ -7,35 +7,37 @@ use stampfly_flight::compact::{Chunks, Compact, Kept, Ring, Streamer, Watching};
 use stampfly_types::Duration;
 use std::cell::RefCell;
 
-/// Words between the flight and whoever streams: several key frames.
+/// Words buffered between flight and receiver: several key frames.
 const WORDS: usize = 32 * 1024;
-/// A chunk fits into a datagram on any network.
+/// Largest chunk, bytes: fits into a datagram on any network.
 const CHUNK: usize = 1200;
-/// There is a chunk when it is this long, or at the end.
+/// Least length of a chunk before the end of the flight, bytes.
 const LEAST: usize = 1000;
-/// Topics of which samples are kept for comparison, the last ones of the table that runnables publish for others.
+/// Number of topics of which samples are kept for comparison: the last periodic ones in the table
+/// that runnables publish.
 const KEPT: usize = 8;
-/// Passes between two of these samples.
+/// Passes between two kept samples.
 const EVERY: u32 = 80;
-/// Between two key frames.
+/// Period of key frames.
 const KEY_FRAMES: Duration = Duration::from_secs(10);
 
-/// Where the record waits.
+/// Buffer of the record.
 pub(super) type RecordRing = Ring<WORDS>;
 type Record<'b, R> = Compact<'b, 'b, R, WORDS>;
-/// Takes a key frame: known where the state can be written.
+/// Function that takes a key frame; a pointer, because the state is serialisable only where it is
+/// set.
 type Frame<'b, R> = fn(&mut Record<'b, R>, &FlightLoop<'b, R>) -> Option<usize>;
 
-/// Who takes it.
+/// Receiver of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Taker {
-    /// The witness, all of it.
+    /// The witness receives all of it.
     Witness,
-    /// Whoever is around the vehicle, when somebody asks for it.
+    /// The surroundings receive it on request.
     Around,
 }
 
-/// A record that is being written.
+/// A record in progress.
 pub(super) struct Recording<'b, R: Schedule> {
     compact: RefCell<Record<'b, R>>,
     streamer: Streamer<'b, WORDS>,
@@ -54,8 +56,10 @@ impl<'b, R: Schedule> Recording<'b, R> {
         R: Serialize,
     {
         let (writer, mut reader) = ring.split();
+        // Surroundings request the record when a client asks for it.
         reader.want(taker == Taker::Witness);
         let table = <R::Topics as TopicTable>::TOPICS.iter().enumerate();
+        // Periodic topics of runnables: samples from outside are recorded completely anyway.
         let fast = table.filter(|(_, info)| !info.is_outside && info.period.is_some());
         let mut topics: Vec<usize> = fast.map(|(place, _)| place).collect();
         topics.drain(..topics.len().saturating_sub(KEPT));
@@ -69,7 +73,7 @@ impl<'b, R: Schedule> Recording<'b, R> {
         }
     }
 
-    /// The flight loop's observer.
+    /// Observer for the flight loop.
     pub(super) const fn watching(&self) -> Watching<'_, 'b, 'b, R, WORDS> {
         Watching(&self.compact)
     }
@@ -82,7 +86,7 @@ impl<'b, R: Schedule> Recording<'b, R> {
         &mut self.streamer
     }
 
-    /// A turn is over: takes a key frame if one is due and nothing is pending.
+    /// Takes a key frame if one is due and no activation is pending.
     pub(super) fn take(&mut self, at_rest: Option<&FlightLoop<'b, R>>) {
         let compact = self.compact.get_mut();
         if let Some(flight_loop) = at_rest.filter(|_| compact.wants_key_frame()) {
@@ -90,12 +94,12 @@ impl<'b, R: Schedule> Recording<'b, R> {
         }
     }
 
-    /// Passes chunks on.
+    /// Passes on chunks of at least [`LEAST`] bytes.
     pub(super) fn pass_on(&mut self, chunk: &mut dyn FnMut(&[u8])) {
         self.stream(LEAST, chunk);
     }
 
-    /// The flight is over.
+    /// Passes on the remaining chunks at the end of the flight.
     pub(super) fn end(&mut self, chunk: &mut dyn FnMut(&[u8])) {
         self.stream(1, chunk);
     }

@@ -1,9 +1,9 @@
-//! A vehicle at the other end of a line: hardware in the loop, the computer's end. The vehicle's is
-//! [`stampfly_flight::hil`].
+//! Hardware in the loop, the computer's end: a vehicle at the other end of a line. The vehicle's
+//! end is [`stampfly_flight::hil`].
 //!
-//! The bus here mirrors the vehicle's: samples from outside are sent, what its runnables have published comes back, and each
-//! reader stands where it stands there. So whatever looks at a flight (pilot, judge, log, report) looks at this one the same
-//! way.
+//! The local bus mirrors the vehicle's: samples from outside are sent to it, samples published by
+//! its runnables are received, and each reader has the same position as on the vehicle. Pilot,
+//! judge, log and report therefore work as with a local flight.
 
 use super::processor::Processor;
 use super::{Around, Witness};
@@ -18,30 +18,30 @@ use std::fmt;
 use std::io;
 use std::time::{Duration, Instant as Wall};
 
-/// Bytes to and from a vehicle.
+/// Byte stream to and from a vehicle.
 pub trait Port {
     /// Sends bytes.
     ///
     /// # Errors
-    /// When the line is gone.
+    /// If the line is gone.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits for bytes, about so long, and returns how many came: 0 when none did.
+    /// Waits up to `patience` for bytes and returns how many were received; 0 on timeout.
     ///
     /// # Errors
-    /// When the line is gone.
+    /// If the line is gone.
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
 }
 
-/// How to talk to a vehicle.
+/// Settings of the conversation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// A question is asked again after this long, and each time in vain after twice as long. Default 250 ms: a vehicle that is
-    /// left alone for [`SILENCE`](stampfly_flight::hil::SILENCE) gives up.
+    /// Time until a request is repeated, doubled with each repetition. Default 250 ms. A vehicle
+    /// without requests for [`SILENCE`](stampfly_flight::hil::SILENCE) gives up.
     pub patience: Duration,
-    /// A vehicle that has not answered a question asked so often is lost. Default 4.
+    /// Number of attempts after which the vehicle counts as lost. Default 4.
     pub tries: u32,
-    /// Ask for each step when its time has come on the wall clock, and not as soon as the last is over. Default off.
+    /// Request each step at its time on the wall clock instead of as soon as possible. Default off.
     pub real_time: bool,
 }
 
@@ -51,21 +51,21 @@ impl Default for Settings {
     }
 }
 
-/// Why a vehicle at the other end of a line cannot go on.
+/// Why a remote flight failed.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum RemoteError {
-    /// This is not offered.
+    /// Not supported remotely.
     NotOffered(&'static str),
-    /// The line is gone.
+    /// The line failed.
     Port(io::Error),
-    /// No answer came.
+    /// All attempts timed out.
     NoAnswer,
-    /// It refuses.
+    /// The vehicle refused the request.
     Refused(Refusal),
-    /// It refuses a parameter.
+    /// The vehicle refused a parameter.
     Parameter(String, Refusal),
-    /// What it said cannot be.
+    /// The answer is invalid.
     Nonsense,
 }
 
@@ -90,40 +90,40 @@ impl From<io::Error> for RemoteError {
     }
 }
 
-/// How the conversation went.
+/// Statistics of the conversation.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Figures {
-    /// Time from a step's question to its answer, each.
+    /// Time from request to answer of each step.
     pub round_trips: Vec<Duration>,
-    /// How long after a step's time on the wall clock its answer came, each; empty unless in real time.
+    /// Delay of each step's answer after its wall-clock time; empty unless in real time.
     pub behind: Vec<Duration>,
-    /// The longest step, by the vehicle's own clock.
+    /// Longest step by the vehicle's clock.
     pub longest: Duration,
-    /// All of them together.
+    /// Sum of all steps.
     pub total: Duration,
-    /// Questions that were asked again.
+    /// Repeated requests.
     pub again: u64,
-    /// Frames that came garbled, here and to the vehicle.
+    /// Corrupted frames received here and by the vehicle.
     pub garbled: [u32; 2],
-    /// Samples that the vehicle's log has missed. What they were is missing in the log here, too.
+    /// Samples lost by the vehicle's log; they are missing in the local log, too.
     pub lost: u32,
 }
 
-/// A vehicle at the other end of a line: greet it, give it parameters, and hand it to [`fly_remote`](super::fly_remote).
-/// `stampfly_host::hil::fly` does all of it.
+/// Connection to a remote vehicle: [greet](Self::greet) it, set its parameters, and hand it to
+/// [`fly_remote`](super::fly_remote). `stampfly_host::hil::fly` does all of this.
 pub struct Remote<'p> {
     port: &'p mut dyn Port,
     settings: Settings,
     decoder: Decoder<Vec<u8>>,
     sequence: u16,
     question: Vec<u8>,
-    /// Received, and not yet looked at.
+    /// Received bytes not yet decoded.
     received: Vec<u8>,
     figures: Figures,
 }
 
 impl<'p> Remote<'p> {
-    /// Says nothing yet.
+    /// A connection; nothing is sent yet.
     pub fn new(port: &'p mut dyn Port, settings: Settings) -> Self {
         Self {
             port,
@@ -136,13 +136,13 @@ impl<'p> Remote<'p> {
         }
     }
 
-    /// How the conversation has gone so far.
+    /// Statistics so far.
     #[must_use]
     pub fn figures(&self) -> &Figures {
         &self.figures
     }
 
-    /// Asks until there is an answer, and hands it to `take`.
+    /// Sends a request, with repetitions, and hands the answer to `take`.
     fn ask<T>(
         &mut self,
         request: &Request<'_>,
@@ -163,9 +163,11 @@ impl<'p> Remote<'p> {
                     let count = self.port.receive(&mut buffer, left)?;
                     self.received.extend_from_slice(&buffer[..count]);
                 }
+                // Bytes after the answer stay in the buffer: they may belong to the next one.
                 for (place, byte) in self.received.iter().enumerate() {
                     let Some(body) = self.decoder.feed(*byte) else { continue };
-                    // An answer to a question that was asked twice comes twice.
+                    // A repeated request may be answered twice; the sequence number identifies the
+                    // second answer.
                     if body.sequence != self.sequence {
                         continue;
                     }
@@ -177,12 +179,13 @@ impl<'p> Remote<'p> {
                 }
                 self.received.clear();
             }
+            // Back-off: a slow line would otherwise be loaded with repetitions.
             patience *= 2;
         }
         Err(RemoteError::NoAnswer)
     }
 
-    /// Asks for something that is either done or refused.
+    /// Sends a request that is either carried out or refused.
     fn want(&mut self, request: &Request<'_>) -> Result<(), RemoteError> {
         self.ask(request, &[], |reply| match reply {
             Reply::Taken => Ok(()),
@@ -191,18 +194,18 @@ impl<'p> Remote<'p> {
         })
     }
 
-    /// Opens the conversation with a vehicle that has this activation table.
+    /// Opens the connection and checks that the vehicle has the tables of `R`.
     ///
     /// # Errors
-    /// When nobody answers, or another vehicle does.
+    /// If the vehicle does not answer or has other tables.
     pub fn greet<R: Schedule>(&mut self) -> Result<(), RemoteError> {
         self.want(&Request::Hello { version: VERSION, tables: tables::<R>() })
     }
 
-    /// Changes a parameter of the vehicle that will fly.
+    /// Sets a parameter before the flight.
     ///
     /// # Errors
-    /// When the vehicle refuses or is lost.
+    /// If the vehicle refuses it or the connection is lost.
     pub fn parameter(&mut self, name: &str, value: f32) -> Result<(), RemoteError> {
         self.want(&Request::Parameter { name, value }).map_err(|error| match error {
             RemoteError::Refused(why) => RemoteError::Parameter(name.into(), why),
@@ -210,32 +213,32 @@ impl<'p> Remote<'p> {
         })
     }
 
-    /// The flight is over.
+    /// Ends the flight.
     pub(super) fn end(&mut self) -> Result<(), RemoteError> {
         match self.want(&Request::End) {
-            // The vehicle does not stay to repeat an answer that was lost.
+            // The vehicle has left the conversation and cannot repeat a lost answer.
             Err(RemoteError::NoAnswer | RemoteError::Port(_)) => Ok(()),
             other => other,
         }
     }
 }
 
-/// A vehicle that flies, and the mirror of its bus.
+/// A remote vehicle in flight and the mirror of its bus.
 pub(super) struct There<'r, 'p, 'b, R: Schedule> {
     remote: &'r mut Remote<'p>,
     mirror: FlightLoop<'b, R>,
-    /// Samples that were not yet sent.
+    /// Samples not yet sent.
     pending: Vec<u8>,
-    /// One of them is on a topic that activates something.
+    /// A pending sample is on a topic that triggers an activation.
     wakes: bool,
     next_tick: Option<Instant>,
     due: Bands,
-    /// When the flight began, by both clocks.
+    /// Start of the flight by both clocks.
     began: (Instant, Wall),
 }
 
 impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
-    /// Switches the vehicle on.
+    /// Powers the vehicle on.
     pub(super) fn start(
         remote: &'r mut Remote<'p>,
         mirror: FlightLoop<'b, R>,
@@ -247,14 +250,15 @@ impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
         Ok(Self { remote, mirror, pending, wakes: false, next_tick, due, began: (at, Wall::now()) })
     }
 
-    /// Has the vehicle anything to do in these bands?
+    /// True if the vehicle has something to do in these bands.
     fn is_needed(&self, now: Instant, bands: Bands) -> bool {
         let may_be = self.wakes || self.next_tick.is_some_and(|tick| tick <= now);
+        // A new sample or tick may concern either band.
         let may_run = bands.flight || bands.background;
         may_be && may_run || self.due.flight && bands.flight || self.due.background && bands.background
     }
 
-    /// Asks the vehicle for a step, and repeats here what it has done.
+    /// Requests one step from the vehicle and applies the results to the mirror.
     fn step(&mut self, now: Instant, bands: Bands, witness: &mut dyn Witness<R>) -> Result<(), RemoteError> {
         let Self { remote, mirror, pending, wakes, next_tick, due, began: (start, wall) } = self;
         let planned = *wall + Duration::from_micros(now.since(*start).as_micros());
@@ -277,9 +281,12 @@ impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
                     Entry::Activation(record) => {
                         let index = usize::from(record.index);
                         let activation = mirror.follow(record);
+                        // The tables were compared when greeting, so this is a corrupt answer.
                         if index >= R::ACTIVATIONS.len() || activation.is_missing_input() {
                             return Err(RemoteError::Nonsense);
                         }
+                        // The three events of an activation come together, because its run time
+                        // here is zero.
                         witness.starts(index);
                         witness.has_read(&activation);
                         witness.finished(&activation);
@@ -306,7 +313,7 @@ impl<'r, 'p, 'b, R: Schedule> There<'r, 'p, 'b, R> {
     }
 }
 
-/// Does a sample on this topic activate something?
+/// True if a sample on this topic triggers an activation.
 fn activates<R: Schedule>(topic: usize) -> bool {
     R::ACTIVATIONS.iter().any(|line| matches!(line.trigger, Trigger::On(topics) if topics.contains(&topic)))
 }
@@ -336,7 +343,7 @@ impl<'b, R: Schedule> Processor<'b, R> for There<'_, '_, 'b, R> {
     ) -> Result<(), RemoteError> {
         let flight = !around.is_held_up(Band::Flight, now);
         let bands = Bands { flight, background: !around.is_held_up(Band::Background, now) };
-        // A processor that is held up for long would get more at once than it has room for.
+        // Samples accumulated while the processor is stalled must fit into one request.
         if self.is_needed(now, bands) || self.pending.len() > LONGEST / 2 {
             self.step(now, bands, witness)?;
             around.drive(now);

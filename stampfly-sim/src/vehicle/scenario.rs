@@ -1,4 +1,4 @@
-//! Scenarios: what to command and what must be true, as lines of text, for any pair of messages.
+//! Scenarios: timed commands and checks as text, for any pair of messages.
 //!
 //! ```text
 //! # seconds  what
@@ -8,8 +8,10 @@
 //! 6.0  end
 //! ```
 //!
-//! Times are seconds from the start, ascending. A check is made on the first line of the log at or after its time; a command
-//! acts after its time, so a check at the same time sees what was before it. For vehicles that are driven by hand; one that is told where to go has a mission instead.
+//! Times are seconds from the start, in ascending order. A check is evaluated on the first line of
+//! the log at or after its time. A command acts after its time, so a check at the same time sees
+//! the state before it. For vehicles driven by direct commands; a vehicle that flies to positions
+//! uses a mission.
 
 use core::marker::PhantomData;
 use stampfly_types::{FieldInfo, FieldKind, Message, text};
@@ -19,18 +21,18 @@ type Comparison = fn(&f64, &f64) -> bool;
 const COMPARISONS: [(&str, Comparison); 5] =
     [("<", f64::lt), ("<=", f64::le), (">", f64::gt), (">=", f64::ge), ("==", f64::eq)];
 
-/// Something that must be true of the log at a time.
+/// A condition on the log at a time.
 #[derive(Clone, Debug)]
 struct Check {
     time: f32,
-    /// As it was written.
+    /// As written, for the report.
     text: String,
     field: usize,
     comparison: Comparison,
     value: f64,
 }
 
-/// Commands `C` by time, checks of the log's lines `L` by time, and the end.
+/// Commands `C` by time, checks on the log's lines `L`, and the end.
 ///
 /// ```
 /// use stampfly_sim::vehicle::Scenario;
@@ -52,10 +54,10 @@ pub struct Scenario<C, L> {
 }
 
 impl<C: Message + Default, L: Message> Scenario<C, L> {
-    /// Reads a scenario whose commands are all valid.
+    /// Parses a scenario. `is_valid` accepts commands.
     ///
     /// # Errors
-    /// Names the line and what is wrong with it.
+    /// The line number and the reason.
     pub fn parse(text: &str, is_valid: fn(&C) -> bool) -> Result<Self, String> {
         let mut scenario = Self { commands: Vec::new(), checks: Vec::new(), end: 0.0, lines: PhantomData };
         let (mut last, mut ended) = (0.0, false);
@@ -64,7 +66,7 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
             let [time, what @ ..] = words.as_slice() else { continue };
             let at = |error: String| format!("line {}: {error}", number + 1);
             let time: f32 = time.parse().map_err(|_| at(format!("'{time}' is no time")))?;
-            // NaN is in no range.
+            // NaN is in no range, so it is refused, too.
             if ended || !(last..f32::INFINITY).contains(&time) {
                 return Err(at("times ascend, and nothing comes after the end".into()));
             }
@@ -73,6 +75,7 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
                 ["end"] => (scenario.end, ended) = (time, true),
                 ["check", check @ ..] => scenario.checks.push(parse_check::<L>(time, check).map_err(at)?),
                 words => {
+                    // Fields that a line does not name keep their values.
                     let before = scenario.commands.last().map_or_else(C::default, |(_, command)| *command);
                     let command = changed(&before, words).filter(is_valid);
                     let command = command.ok_or_else(|| at(format!("'{}' is no command", words.join(" "))))?;
@@ -83,25 +86,26 @@ impl<C: Message + Default, L: Message> Scenario<C, L> {
         if ended { Ok(scenario) } else { Err("the scenario has no end".into()) }
     }
 
-    /// When it is over, s.
+    /// End of the scenario, s.
     #[must_use]
     pub fn end(&self) -> f32 {
         self.end
     }
 
-    /// The command that acts at this time; the default before the first.
+    /// The command at this time; the default before the first.
     #[must_use]
     pub fn command(&self, time: f32) -> C {
         let command = self.commands.iter().rev().find(|(since, _)| *since < time);
         command.map_or_else(C::default, |(_, command)| *command)
     }
 
-    /// The checks that do not hold, as they were written. `lines`: the log with its times, s. A check that the log does not
-    /// reach has failed.
+    /// The checks that fail, as written. `lines` is the log with times, s. A check after the end of
+    /// the log fails.
     pub fn failures(&self, lines: impl Iterator<Item = (f32, L)>) -> Vec<String> {
         let mut lines = lines.peekable();
         let mut failures = Vec::new();
         for check in &self.checks {
+            // Both sequences ascend, so each line is skipped once.
             while lines.next_if(|(time, _)| *time < check.time).is_some() {}
             let value = lines.peek().and_then(|(_, line)| {
                 let words = line.to_words();
@@ -130,7 +134,7 @@ fn parse_check<L: Message>(time: f32, words: &[&str]) -> Result<Check, String> {
     Ok(Check { time, text: format!("{time} s: {}", words.join(" ")), field, comparison, value })
 }
 
-/// A command with some of its fields changed: pairs of name and value.
+/// The command with fields changed by pairs of name and value.
 fn changed<C: Message>(command: &C, words: &[&str]) -> Option<C> {
     let written = |(field, words): (&FieldInfo, &[u32])| {
         let mut text = String::new();

@@ -1,7 +1,9 @@
-//! Surroundings without a world, for a vehicle whose dynamics are one of its own components (software in the loop).
+//! Surroundings without a world, for a vehicle whose dynamics are one of its own components
+//! (software in the loop).
 //!
-//! Around it is only who drives it, and what there is to say of a flight is in its log: implement [`Script`] and use
-//! [`Scripted`] as the vehicle's surroundings. A vehicle with sensors and a plant needs surroundings of its own.
+//! Such a vehicle needs only a driver, and its log contains all results: implement [`Script`] and
+//! use [`Scripted`] as the vehicle's surroundings. A vehicle with sensors and a plant needs
+//! surroundings of its own.
 
 use super::{Around, Outside, Surroundings};
 use crate::time::{Clock, Tasks};
@@ -9,33 +11,34 @@ use stampfly_bus::Schedule;
 use stampfly_flight::newest::message;
 use stampfly_types::{Instant, Message};
 
-/// Who drives a vehicle, for how long, and how well it did.
+/// Driver, length and judge of a flight.
 pub trait Script: Clone {
     /// The vehicle's runnables.
     type Runnables: Schedule;
     /// A line of the vehicle's log.
     type Line: Message;
-    /// How a flight went.
+    /// Result of a flight.
     type Outcome;
-    /// The topic of the log.
+    /// Topic of the log.
     const LOG: usize;
 
-    /// Starts what drives the vehicle, and hands it the ends it owns. The clock begins at zero.
+    /// Starts the tasks that drive the vehicle, and gives each the bus ends that it owns. The clock
+    /// starts at zero.
     fn start<'a>(&'a self, clock: &Clock, tasks: &mut Tasks<'a>, outside: Outside<'a, Self::Runnables>);
 
-    /// The flight is over after this many lines.
+    /// Number of log lines after which the flight is over.
     fn length(&self) -> usize;
 
-    /// Is it ended from outside before that? A script of its own is not.
+    /// True if an external program has ended the flight. Never by default.
     fn is_ended(&self) -> bool {
         false
     }
 
-    /// How a flight with this log went.
+    /// The result of a flight with this log.
     fn judge(&self, lines: Vec<Self::Line>) -> Self::Outcome;
 }
 
-/// What is around a vehicle that follows a script.
+/// Surroundings of a vehicle that follows a script.
 pub struct Scripted<S> {
     script: S,
     clock: Clock,
@@ -67,7 +70,7 @@ impl<S: Script> Surroundings for Scripted<S> {
     }
 }
 
-/// A script during a flight.
+/// A running script.
 pub struct Following<'a, S: Script> {
     script: &'a S,
     lines: Vec<S::Line>,

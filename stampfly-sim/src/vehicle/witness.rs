@@ -1,47 +1,51 @@
-//! Being told everything that happens in a flight.
+//! Observer of all events of a flight.
 
 use stampfly_bus::Schedule;
 use stampfly_flight::{FlightLoop, Observer};
 use stampfly_types::Instant;
 
-/// Is told everything that happens in a flight, in order. All of it may be ignored.
+/// Receives all events of a flight in order. Every function does nothing by default.
 ///
-/// A pair of witnesses is one.
+/// A pair of witnesses is a witness: both receive each event.
 pub trait Witness<R: Schedule>: Observer {
-    /// The vehicle is switched on.
+    /// The vehicle is powered on.
     fn begins(&mut self, _start: Instant) {}
 
-    /// The executor is about to look what is due.
+    /// The executor is about to check which activations are due.
     fn turn(&mut self, _clock: Instant) {}
 
     /// A sample was published.
     fn published(&mut self, _topic: usize, _at: Instant, _generation: u32, _words: &[u32]) {}
 
-    /// The surroundings have a sample for the log: its place in [`Vehicle::BESIDE`](super::Vehicle::BESIDE).
+    /// A sample of the surroundings for the log; `place` is its index in
+    /// [`Vehicle::BESIDE`](super::Vehicle::BESIDE).
     fn beside(&mut self, _place: usize, _at: Instant, _generation: u32, _words: &[u32]) {}
 
-    /// Nothing is pending, and everything published has been passed on: the moment for a key frame, or to change something.
+    /// No activation is pending and all published samples have been passed on: a key frame or a
+    /// change can be made now.
     fn at_rest(&mut self, _clock: Instant, _flight_loop: &mut FlightLoop<'_, R>) {}
 
-    /// Something of the vehicle's state was replaced from outside, as by a change of parameters: a replay goes on from a key frame.
+    /// State of the vehicle was replaced from outside, as by a change of parameters. A replay
+    /// continues from the next key frame.
     fn replaced(&mut self, _clock: Instant) {}
 
-    /// The log's taps have lost so many samples so far.
+    /// Total number of samples lost by the log's taps.
     fn lost(&mut self, _clock: Instant, _samples: u32) {}
 
-    /// Does somebody want the compact record of the flight, and what is the vehicle's name in there? Asked before the flight.
+    /// The vehicle's name in the compact record, if this witness takes the record. Called before
+    /// the flight.
     fn record_of(&self) -> Option<&'static str> {
         None
     }
 
-    /// The next chunk of that record.
+    /// The next chunk of the compact record.
     fn recorded(&mut self, _chunk: &[u8]) {}
 
     /// The flight is over.
     fn ends(&mut self) {}
 }
 
-/// Nothing to be told.
+/// A witness that ignores all events.
 impl<R: Schedule> Witness<R> for () {}
 
 impl<R: Schedule, A: Witness<R>, B: Witness<R>> Witness<R> for (A, B) {

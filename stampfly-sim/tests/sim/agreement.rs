@@ -1,8 +1,8 @@
-//! Drivers over emulated chips and the models of the sensors look at the same flight and report the same.
+//! Drivers on emulated chips agree with the sensor models in the same flight.
 //!
-//! Both halves of each pair are the same specimen (the seed's), but they sample at instants of their own and draw noise
-//! of their own. What has to agree is what is left when that is averaged away: the mean difference, within the
-//! resolution of the sensor.
+//! Both members of each pair are the same specimen, given by the seed, but sample at their own
+//! instants and draw their own noise. The mean difference has to be within the resolution of the
+//! sensor.
 
 use crate::{mounting, pilot};
 use core::cell::RefCell;
@@ -21,18 +21,18 @@ use stampfly_sim::time::{Tasks, block_on};
 use stampfly_sim::{Conditions, Simulation, SimulationConfig};
 use stampfly_types::{Duration, Instant};
 
-/// Samples of one source: when, and the channels.
+/// Samples of one source: instants and channels.
 type Series<const N: usize> = Vec<(Instant, [f32; N])>;
 
-/// The flight: stand for a second, climb to 0.8 m, hover in gusts.
+/// The flight: one second on the ground, climb to 0.8 m, hover in gusts.
 const END: Instant = Instant::from_secs(14);
-/// Compared from here on: every driver runs and the vehicle hovers.
+/// Start of the comparison: all drivers run and the vehicle hovers.
 const BEGIN: Instant = Instant::from_secs(3);
 
 /// Counts of the inertial sensor: ±8 g and ±2000 °/s in 16 bits.
 const IMU: [f32; 6] = [0.0024, 0.0024, 0.0024, 0.001, 0.001, 0.001];
 
-/// A series at this instant, between its neighbours.
+/// Value of a series at this instant, by linear interpolation.
 fn at<const N: usize>(series: &Series<N>, instant: Instant) -> Option<[f32; N]> {
     let after = series.partition_point(|(at, _)| *at < instant);
     let ((begin, before), (end, next)) = (series.get(after.checked_sub(1)?)?, series.get(after)?);
@@ -40,7 +40,7 @@ fn at<const N: usize>(series: &Series<N>, instant: Instant) -> Option<[f32; N]> 
     Some(core::array::from_fn(|n| before[n] + (next[n] - before[n]) * share))
 }
 
-/// Mean difference of each channel, driver less model.
+/// Mean difference of each channel, driver minus model.
 fn difference<const N: usize>(driver: &Series<N>, model: &Series<N>) -> [f32; N] {
     let compared = driver.iter().filter(|(at, _)| *at >= BEGIN);
     let differences: Vec<[f32; N]> = compared
@@ -51,7 +51,7 @@ fn difference<const N: usize>(driver: &Series<N>, model: &Series<N>) -> [f32; N]
     sum.map(|s| s / differences.len() as f32)
 }
 
-/// Running sums: what was counted between the begin of the comparison and each instant.
+/// Running sums from the start of the comparison to each instant.
 fn summed(series: &Series<2>) -> Series<2> {
     let mut sum = [0.0; 2];
     let add = |(at, [x, y]): &(Instant, [f32; 2])| {
@@ -76,18 +76,19 @@ macro_rules! watch {
 #[test]
 fn drivers_and_models_report_the_same_flight() {
     for seed in 1..=6 {
-        // What is counted adds up, and so does its noise: four deviations of the difference after eleven seconds.
+        // Counts accumulate, and so does their noise: four standard deviations of the difference
+        // after eleven seconds.
         compare(&SimulationConfig { seed, ..SimulationConfig::example() }, [80.0, 2.5, 0.004]);
     }
 }
 
-/// Scale, offset, lever and mounting are the specimen's. Draughts are each sensor's own, and a picture's error is each picture's: a tenth of what
-/// has gone by in eleven seconds of a hover.
+/// Scale, offset, lever and mounting belong to the specimen. Draughts differ between sensors and
+/// picture errors between pictures: a tenth of the flow accumulated in eleven seconds of hover.
 #[test]
 fn drivers_and_models_are_the_same_specimen_in_the_harsh_world() {
     for seed in 1..=4 {
         let drawn = SimulationConfig { seed, ..SimulationConfig::example() }.in_harsh_world().conditions;
-        // The pilot of this test knows his vehicle: its body is as designed, its sensors are not.
+        // The pilot of this test needs a nominal airframe; only the sensors are harsh.
         let conditions = Conditions {
             mass_spread: 0.0,
             thrust_spread: 0.0,
@@ -100,14 +101,14 @@ fn drivers_and_models_are_the_same_specimen_in_the_harsh_world() {
     }
 }
 
-/// The bounds of flow, pressure and current: counts, Pa, A.
+/// Limits of flow, pressure and current: counts, Pa, A.
 fn compare(config: &SimulationConfig, [counts, pressure, current]: [f32; 3]) {
     let seed = config.seed;
     let image = stand_in_image();
     let Simulation { clock, world, sensors } = Simulation::new(config);
     let board = Board::new(&world, &clock, config, &image);
     let Sensors { imu, flow, tof, mag, baro, power, mut motors, .. } = sensors;
-    // Every chip has started up.
+    // All chips have started.
     clock.advance_to(Instant::from_millis(60));
 
     let [imu_driver, imu_model] = [const { RefCell::new(Series::<6>::new()) }; 2];
@@ -140,7 +141,7 @@ fn compare(config: &SimulationConfig, [counts, pressure, current]: [f32; 3]) {
     watch!(tasks, baro, baro_model, baro_channels);
     let boot = BootAddress::new();
     let (i2c, shutdown) = (board.i2c.clone(), board.shutdown_bottom);
-    // The one that looks ahead stays in reset: both answer at the same address after power-on.
+    // The front range finder stays in reset, because both have the same address after power-on.
     let mut shutdown_front = board.shutdown_front;
     let Ok(()) = shutdown_front.set_low();
     let driver = Vl53l3cx::new(i2c, shutdown, &boot, 0x30, time(), vl53l3cx::Config::default());
@@ -174,17 +175,18 @@ fn compare(config: &SimulationConfig, [counts, pressure, current]: [f32; 3]) {
     };
     close("imu", &difference(&imu_driver.borrow(), &imu_model.borrow()), &IMU);
     close("mag", &difference(&mag_driver.borrow(), &mag_model.borrow()), &[0.3; 3]);
-    // Each draws its own weather: 0.12 Pa/√s, four deviations of the difference after fourteen seconds.
+    // Each draws its own drift: 0.12 Pa/√s, four standard deviations of the difference after
+    // fourteen seconds.
     close("baro", &difference(&baro_driver.borrow(), &baro_model.borrow()), &[pressure]);
     close("power", &difference(&power_driver.borrow(), &power_model.borrow()), &[0.008, current]);
-    // A count is a millimetre.
+    // Resolution: 1 mm.
     close("range", &difference(&range_driver.borrow(), &range_model.borrow()), &[0.001]);
     close("flow", &difference(&summed(&flow_driver.borrow()), &summed(&flow_model.borrow())), &[counts * 0.00222; 2]);
 }
 
 #[test]
 fn drivers_and_models_say_the_same_of_a_range_that_is_none() {
-    // Too near, near, too far for enough light, nothing there.
+    // Too near, near, too far for the signal, no target.
     for (height, status) in [(0.015, 4), (1.0, 0), (4.2, 2), (30.0, 2)] {
         let plant =
             PlantParameters { gravity: 0.0, ground_height: 0.005, drag_quadratic: 0.0, ..PlantParameters::EXAMPLE };

@@ -1,4 +1,4 @@
-//! What pages ask of a vehicle at once, and which of it is called done.
+//! Simultaneous page requests: limit, and confirmation.
 
 use core::cell::RefCell;
 use stampfly_bus::TopicInfo;
@@ -43,7 +43,7 @@ impl Ports for Closed {
     }
 }
 
-/// A vehicle that takes every command and does none.
+/// A vehicle that accepts all commands and carries out none.
 struct Raft(Requested<Numbers, 8>);
 
 impl Hands for Raft {
@@ -93,7 +93,7 @@ fn of_many_commands_of_pages_none_is_called_done_that_was_not() {
     let is_refused = |answer: &String, why: &str| answer.contains("\"ok\":false") && answer.contains(why);
     assert!(answers.iter().all(|answer| is_refused(answer, "too many commands at once")), "{answers:?}");
     answers.clear();
-    // What ends a flight finds room.
+    // Requests that end a flight are still accepted.
     ask(&mut served, &mut answers, 71, "kill");
     assert!(answers.len() == 1 && is_refused(&answers[0], "a later command ends the flight"), "{answers:?}");
     answers.clear();

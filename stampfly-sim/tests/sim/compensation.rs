@@ -1,4 +1,4 @@
-//! What Bosch's formulas make of raw counts, written for the tests apart from the drivers and the emulators.
+//! Bosch's compensation formulas, implemented for the tests independently of drivers and emulators.
 
 /// Temperature, °C, and pressure, Pa, by the 64-bit integer formula.
 pub fn bmp280(calibration: &[u8; 24], data: &[u8; 6]) -> (f64, f64) {

@@ -1,4 +1,4 @@
-//! The worlds that options choose, and what the numbers of a flight are then.
+//! Worlds selected by options, and the resulting parameters of a flight.
 
 use stampfly_sim::vehicle::{Options, WorldKind};
 use stampfly_sim::{Conditions, SimulationConfig};

@@ -1,4 +1,4 @@
-//! One seed, one flight: to the last bit, however the sensors are read.
+//! The same seed gives the same flight bit for bit, independently of how the sensors are read.
 
 use stampfly_drivers::{Imu, MotorOutputs, OpticalFlow, RangeFinder};
 use stampfly_sim::time::Tasks;
@@ -7,7 +7,7 @@ use stampfly_types::messages::MotorOutput;
 use stampfly_types::{Instant, Message};
 use std::cell::RefCell;
 
-/// All the words two sensors and the truth give in two seconds with the motors running.
+/// All words of two sensors and the truth in two seconds with the motors running.
 fn fly(seed: u64, with_flow: bool) -> Vec<u32> {
     let Simulation { clock, world, sensors } =
         Simulation::new(&SimulationConfig { seed, ..SimulationConfig::example() });

@@ -1,4 +1,5 @@
-//! The loop closes: with a small control law on the truth the vehicle stands, takes off, hovers and lands.
+//! Closed loop: with a small control law on the true state the vehicle stands, takes off, hovers
+//! and lands.
 
 use crate::pilot;
 use stampfly_drivers::{Imu, MotorOutputs};
@@ -9,7 +10,8 @@ use stampfly_types::Instant;
 use stampfly_types::frame::tilt;
 use stampfly_types::messages::MotorOutput;
 
-/// Flies with the target height as a function of time (`None`: motors off) and returns the truth at every sample.
+/// Flies with the target height as a function of time (`None`: motors off) and returns the true
+/// state at every sample.
 fn fly(config: &SimulationConfig, seconds: u32, target: impl Fn(f32) -> Option<f32>) -> Vec<Truth> {
     let mut simulation = Simulation::new(config);
     let clock = simulation.clock.clone();

@@ -1,5 +1,6 @@
-//! Vehicles, sensors, emulated chips, and the real drivers over them. One binary, because each would link the simulator again:
-//! `cargo test -p stampfly-sim --test sim chips` runs one folder.
+//! Tests of vehicles, sensors, emulated chips, and the real drivers on them. One binary, because
+//! each further one would link the simulator again: `cargo test -p stampfly-sim --test sim chips`
+//! runs one folder.
 
 mod aeroplane;
 mod agreement;

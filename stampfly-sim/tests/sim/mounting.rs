@@ -1,4 +1,4 @@
-//! How the emulated chips are soldered to their board: what their drivers have to be told.
+//! Mounting of the emulated chips on their board, as configured in their drivers.
 
 use stampfly_drivers::chip::{Axis, AxisMap};
 

@@ -1,4 +1,4 @@
-//! What an aeroplane's sensors report against what is true, and what its servos do.
+//! Readings of an aeroplane's sensors compared with the truth, and the response of its servos.
 
 use nalgebra::Vector3;
 use stampfly_drivers::{Airspeed, Barometer, Gnss, Imu, Magnetometer, MotorOutputs, Sample, ServoOutputs};
@@ -22,7 +22,7 @@ fn standing() -> SimulationConfig<AeroplaneParameters> {
     }
 }
 
-/// In steady flight at 12 m/s to the north, 50 m high.
+/// Steady flight at 12 m/s to the north, 50 m high.
 fn flying(wind: WindConfig) -> Simulation {
     let trim = Aeroplane::trim(&PERFECT, 12.0, 0.0).expect("flies");
     let simulation =
@@ -64,7 +64,7 @@ fn the_first_fix_takes_some_seconds_and_comes_without_a_height() {
 
 #[test]
 fn the_error_of_a_fix_wanders_as_far_as_it_says_and_each_has_some_of_its_own() {
-    // Faster, so that the wander is seen whole.
+    // A short correlation time, so that the full wander is observed.
     let config = GnssConfig { correlation: 2.0, first_fix: 0.0, rate: 10.0, ..GnssConfig::m8(ORIGIN) };
     let simulation = Simulation::new(&standing());
     let fixes = fixes(&simulation, &config, 20_000);
@@ -79,7 +79,7 @@ fn the_error_of_a_fix_wanders_as_far_as_it_says_and_each_has_some_of_its_own() {
         let said = if axis < 2 { fixes[9].data.horizontal_accuracy } else { fixes[9].data.vertical_accuracy };
         let seen = deviation(places.iter().map(|place| place[axis]));
         assert!((seen / f64::from(said) - 1.0).abs() < 0.1, "axis {axis}: {seen} m, {said} m said");
-        // Two fixes differ by their own noise and by how far the error wandered meanwhile.
+        // Two fixes differ by their white noise and by the wander between them.
         let (wander, own) = if axis < 2 { (1.2, 0.15) } else { (2.0, 0.3) };
         let expected = (2.0 * (own * own + wander * wander * (1.0 - (-0.05f64).exp()))).sqrt();
         let steps = deviation(places.windows(2).map(|pair| pair[1][axis] - pair[0][axis]));
@@ -101,13 +101,13 @@ fn a_fix_is_where_the_aeroplane_was_and_ten_a_second_overlap() {
         ..GnssConfig::m8(ORIGIN)
     };
     let fixes = fixes(&simulation, &config, 100);
-    // The same flight again, to ask what was true when.
+    // The same flight again, for the truth at these instants.
     let truth = flying(WindConfig::CALM).world;
     for pair in fixes.windows(2) {
         assert_eq!(pair[1].at.since(pair[0].at).as_micros(), 100_000, "none is missed");
         let [north, _] = ORIGIN.local(pair[1].data.latitude, pair[1].data.longitude);
         let way = truth.motion_at(pair[1].at).position.x;
-        // A ten-millionth of a degree is 11 mm.
+        // 10⁻⁷ degrees is 11 mm.
         assert!((f64::from(north) - way).abs() < 0.012, "{north} m after {way} m");
     }
     assert!((fixes[10].data.velocity.x - 12.0).abs() < 0.05 && (fixes[10].data.altitude - 80.0).abs() < 0.1);
@@ -141,13 +141,13 @@ fn the_tube_measures_the_wind_ahead_with_its_errors() {
             sum
         })
     };
-    // 12 m/s at an angle of attack, of which the tube sees the cosine.
+    // 12 m/s at an angle of attack, of which the tube measures the cosine.
     let alpha = Aeroplane::trim(&PERFECT, 12.0, 0.0).expect("flies").alpha;
     let dynamic = 0.5 * 1.225 * (12.0 * alpha.cos()).powi(2);
     let seen = mean(&mut tube, &simulation);
     assert!((seen - (dynamic * scale + offset)).abs() < 1.0, "{seen} Pa of {dynamic} Pa");
 
-    // Standing, with the wind from behind: below zero.
+    // At rest with wind from behind: negative.
     let pose = Some(PERFECT.standing([0.0; 2], core::f64::consts::PI));
     let simulation = Simulation::new(&SimulationConfig { wind, pose, ..standing() });
     let mut tube = AirspeedModel::new(&simulation.world, &simulation.clock, 3);
@@ -173,7 +173,7 @@ fn servos_take_what_is_finite_and_exists() {
     let expected: [f64; SURFACES] = [1.0, -0.3, 0.0, 0.4, 0.0, 0.0];
     assert!(shares.iter().zip(expected).all(|(share, expected)| (share - expected).abs() < 1e-3), "{shares:?}");
 
-    // A quadrotor has none.
+    // A quadrotor has no surfaces.
     let Simulation { clock, world, .. } = Simulation::new(&SimulationConfig::example());
     let Ok(()) = ServoModel::new(&world, &clock, &all).write(&ServoOutput { deflection, count: 4 });
     world.advance_to(Instant::from_millis(10));
@@ -193,7 +193,7 @@ fn throttle_vibration_compass_and_barometer_work_in_an_aeroplane() {
             sample.data.field - simulation.sensors.mag.hard_iron()
         })
     };
-    // Kanazawa's field, turned by the heading of 0.7 rad.
+    // Kanazawa's field, rotated by the heading of 0.7 rad.
     let seen = field(compass);
     let (sin, cos) = (math::sin(0.7), math::cos(0.7));
     assert!((seen.x - (30.8 * cos - 4.3 * sin)).abs() < 3.0 && (seen.z - 36.4).abs() < 3.0, "{seen:?}");

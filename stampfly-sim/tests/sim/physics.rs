@@ -1,4 +1,4 @@
-//! The plant against what mechanics says about it.
+//! The plant compared with mechanics.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -96,7 +96,7 @@ fn a_crashed_vehicle_lies_on_its_back_above_the_floor() {
 
 #[test]
 fn friction_holds_on_the_floor_up_to_its_limit() {
-    // A steady wind that pushes with less, then with more than what friction holds.
+    // A steady wind with less, then with more force than static friction.
     let parameters = PlantParameters { drag_quadratic: 0.1, ..perfect() };
     let slip = |speed: f32| {
         let wind = WindConfig { mean: stampfly_types::Vec3::x() * speed, ..WindConfig::CALM };
@@ -104,7 +104,8 @@ fn friction_holds_on_the_floor_up_to_its_limit() {
         run(&mut plant, 2.0);
         plant.motion().position.x
     };
-    // At the height of the body a eleventh of the wind is left: 10 m/s push with 0.08 N, 25 m/s with 0.5 N; 0.29 N hold.
+    // At the height of the body an eleventh of the wind remains: 10 m/s push with 0.08 N, 25 m/s
+    // with 0.5 N; friction holds 0.29 N.
     assert!(slip(10.0).abs() < 1e-3, "{}", slip(10.0));
     assert!(slip(25.0) > 0.05, "{}", slip(25.0));
 }
@@ -124,7 +125,8 @@ fn the_floor_adds_lift_and_the_extra_fades_with_height() {
 fn speeding_up_a_rotor_pushes_the_body_the_other_way_before_drag_does() {
     let parameters = perfect();
     let mut plant = calm(&parameters, Some(&Pose { rotors: 0.5, ..Pose::hovering(5.0) }));
-    // The counter-clockwise pair gets power: their drag and their acceleration both turn the body clockwise.
+    // The counter-clockwise pair gets power: its drag and its acceleration both turn the body
+    // clockwise.
     plant.set_duty([0.8, 0.0, 0.8, 0.0]);
     plant.step();
     let acceleration = plant.motion().angular_acceleration.z;
@@ -135,7 +137,8 @@ fn speeding_up_a_rotor_pushes_the_body_the_other_way_before_drag_does() {
 
 #[test]
 fn rotors_turning_one_way_deflect_a_pitch_into_a_roll() {
-    // Only the clockwise pair turns: its angular momentum points down, so pitching up rolls the vehicle: −ω × h.
+    // Only the clockwise pair turns: its angular momentum points down, so pitching up rolls the
+    // vehicle: −ω × h.
     let parameters = PlantParameters { drag_vertical: 0.0, drag_rotation: 0.0, drag_quadratic: 0.0, ..perfect() };
     let mut plant = calm(&parameters, Some(&Pose { rotors: 0.0, ..Pose::hovering(50.0) }));
     plant.set_duty([0.0, 0.6, 0.0, 0.6]);
@@ -151,7 +154,8 @@ fn rotors_turning_one_way_deflect_a_pitch_into_a_roll() {
         rolled += plant.motion().angular_acceleration.x / 1600.0;
     }
     assert!(still.abs() < 1e-9);
-    // Pitch rate stays near 2 rad/s while the momentum builds up; the sign is the point, the size a bound.
+    // The pitch rate stays near 2 rad/s while the momentum builds up; the sign matters, the size is
+    // a bound.
     let limit = -2.0 * momentum / parameters.inertia_x * 0.3;
     assert!(rolled < 0.0 && rolled > 2.0 * limit, "{rolled} against {limit}");
 }
@@ -169,7 +173,7 @@ fn a_hover_drains_the_battery_as_fast_as_its_current_says() {
         seconds += 1.0;
         drawn += plant.motion().current;
     }
-    // Ninety percent, in ampere seconds.
+    // 90 %, in A·s.
     assert!((drawn / (0.9 * 3600.0 * p.battery_capacity) - 1.0).abs() < 0.01, "{drawn} C");
     assert!((3.0..5.0).contains(&(drawn / seconds)), "{} A", drawn / seconds);
 }
@@ -215,7 +219,7 @@ fn open_propellers_that_touch_the_floor_stand_and_push_nothing() {
     let on_its_back = lay(&open, over);
     assert!(on_its_back.rotors().speed().iter().all(|speed| *speed < 1.0), "{:?}", on_its_back.motion());
     assert!(on_its_back.ground().scrapes() > 0 && on_its_back.motion().velocity.norm() < 0.01);
-    // Four motors that are held.
+    // Four stalled motors.
     let stall = 4.0 * 0.4 * 0.4 * on_its_back.battery().voltage() / open.motor_resistance;
     assert!((on_its_back.motion().current / (stall + open.board_current) - 1.0).abs() < 0.05);
     assert!(on_its_back.battery().voltage() < on_its_back.battery().open_circuit() - 0.9 * 0.05 * stall);
@@ -226,7 +230,7 @@ fn open_propellers_that_touch_the_floor_stand_and_push_nothing() {
     run(&mut tips, 0.02);
     let [right, _, left, _] = tips.rotors().speed();
     assert!(right < 0.4 * left && left > 500.0, "{right}, {left}");
-    // In a frame that is as wide and as high nothing touches them.
+    // Inside a frame as wide and as high as the propellers nothing touches them.
     assert!(lay(&perfect(), over).rotors().speed().iter().all(|speed| *speed > 500.0));
 
     let mut stands = calm(&open, None);
@@ -235,7 +239,8 @@ fn open_propellers_that_touch_the_floor_stand_and_push_nothing() {
     assert!(stands.ground().contact() && stands.ground().scrapes() == 0);
 }
 
-/// The loop over the voltage of the step before swung by volts above 0.125 Ω with these motors.
+/// Regression: using the voltage of the previous step oscillated by volts above 0.125 Ω with these
+/// motors.
 #[test]
 fn a_weak_battery_is_steady() {
     let parameters = PlantParameters { battery_resistance: 0.28, battery_polarisation: 0.0, ..perfect() };
@@ -263,7 +268,7 @@ fn what_leaves_the_battery_heats_it_and_the_motors_and_turns_the_rotors() {
         let mut plant = calm(&parameters, Some(&Pose::hovering(1000.0)));
         let (mut given, mut taken) = (0.0, 0.0);
         for step in 0..1600 {
-            // Up and down between idle and full, each motor at its own time.
+            // Between idle and full, each motor at its own time.
             let duty: [f64; 4] = core::array::from_fn(|motor| f64::from((step / 40 + 3 * motor as u32) % 11) / 10.0);
             plant.set_duty(duty);
             let (speed, open) = (plant.rotors().speed(), plant.battery().open_circuit());

@@ -1,6 +1,7 @@
-//! A pilot that sees the truth: the smallest control law that can hover, climb and land.
+//! The smallest control law that can hover, climb and land, on the true state.
 //!
-//! Proportional and derivative action only, on quantities no real vehicle knows. It exists to try the simulator.
+//! Proportional and derivative action on quantities that no real vehicle knows; it exists to test
+//! the simulator.
 
 use stampfly_sim::Truth;
 use stampfly_sim::plant::PlantParameters;
@@ -13,12 +14,12 @@ const INERTIA: Vec3 = Vec3::new(VEHICLE.inertia_x as f32, VEHICLE.inertia_y as f
 const OFFSET: f32 = VEHICLE.rotor_offset as f32;
 const YAW_ARM: f32 = (VEHICLE.torque_coefficient / VEHICLE.thrust_coefficient) as f32;
 
-/// Motor duties that bring the example's vehicle to the origin's vertical at `down` metres (negative is up).
+/// Motor duties that bring the example vehicle above the origin at `down` metres (negative is up).
 pub fn fly(truth: &Truth, down: f32) -> MotorOutput {
     let error = Vec3::new(-truth.position.x, -truth.position.y, (down - truth.position.z).clamp(-0.3, 0.3));
     let wanted =
         error.component_mul(&Vec3::new(1.5, 1.5, 6.0)) - truth.velocity.component_mul(&Vec3::new(2.0, 2.0, 4.0));
-    // Thrust direction in the body frame, as a small tilt to correct.
+    // Thrust direction in the body frame, as a small tilt error.
     let force = truth.attitude.inverse_transform_vector(&(wanted.map(|a| a.clamp(-3.0, 3.0)) - Vec3::z() * GRAVITY));
     let north = truth.attitude.inverse_transform_vector(&Vec3::x());
     let thrust = -force.z * MASS;

@@ -1,10 +1,10 @@
-//! Scenarios: what is refused, and when commands act and checks are made.
+//! Scenarios: rejected texts, and instants of commands and checks.
 
 use proptest::prelude::*;
 use stampfly_sim::vehicle::Scenario;
 use stampfly_types::messages::{FlightStatus, PowerData};
 
-/// A voltage is commanded, a mode is watched.
+/// Commands a voltage and checks a mode.
 fn parse(text: &str) -> Result<Scenario<PowerData, FlightStatus>, String> {
     Scenario::parse(text, |power| (0.0..=5.0).contains(&power.voltage))
 }

@@ -1,4 +1,4 @@
-//! What the chips report against what is true.
+//! Sensor readings compared with the truth.
 
 use core::f32::consts::PI;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -8,7 +8,7 @@ use stampfly_sim::time::block_on;
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::{Duration, Instant, Vec3, math};
 
-/// A vehicle without weight, motors and air: it keeps its velocity and its turning.
+/// A vehicle without weight, motors and air: it keeps its velocity and its rotation.
 fn drifting(seed: u64, pose: Pose) -> Simulation {
     let plant = PlantParameters {
         gravity: 0.0,
@@ -59,7 +59,7 @@ fn the_inertial_sensor_at_rest_reads_gravity_and_its_offsets() {
         let expected = [accel_bias.x, accel_bias.y, accel_bias.z - 9.80665, gyro_bias.x, gyro_bias.y, gyro_bias.z];
         for (axis, (channel, expected)) in channels.iter().zip(expected).enumerate() {
             let (mean, deviation) = mean_and_deviation(channel);
-            // Scale and misalignment of half a per cent act on the 9.8 m/s² of the accelerometer.
+            // Scale and misalignment of 0.5 % act on the accelerometer's 9.8 m/s².
             let (tolerance, noise) = if axis < 3 { (0.06, 0.014) } else { (5e-4, 0.0017) };
             assert!((mean - expected).abs() < tolerance, "axis {axis}: {mean} instead of {expected}");
             assert!((deviation / noise - 1.0).abs() < 0.25, "axis {axis}: {deviation}");
@@ -132,7 +132,7 @@ fn ranges_too_near_too_far_or_into_the_sky_are_not_vouched_for() {
     }
 }
 
-/// Sum of the flow over about five seconds, and the time it took.
+/// Sum of the flow over about five seconds, and the duration.
 fn sweep(simulation: &mut Simulation) -> (f32, f32, f32) {
     let clock = simulation.clock.clone();
     let mut sum = (0.0, 0.0, 0.0);
@@ -154,7 +154,7 @@ fn flow_is_velocity_over_height_forward_and_right_positive() {
         let pose = Pose { velocity: Vector3::new(0.4, -0.3, 0.0), ..Pose::hovering(0.8) };
         let (x, y, time) = sweep(&mut drifting(seed, pose));
         let (expected_x, expected_y) = (0.4 / 0.8 * time, -0.3 / 0.8 * time);
-        // 3 % of scale and 1° of mounting belong to the specimen; the noise of the sum is a hundredth of a radian.
+        // 3 % of scale and 1° of mounting belong to the specimen; the noise of the sum is 0.01 rad.
         assert!((x - expected_x).abs() < 0.03 * expected_x + 0.07, "{x} instead of {expected_x}");
         assert!((y - expected_y).abs() < -0.03 * expected_y + 0.09, "{y} instead of {expected_y}");
         assert!((x / expected_x - 1.0).abs() < 0.06 && (y / expected_y - 1.0).abs() < 0.08);
@@ -182,7 +182,7 @@ fn flow_sees_no_motion_on_the_floor_and_nothing_far_above_it() {
         let Ok(sample) = block_on(&clock, simulation.sensors.flow.next());
         sum += sample.data.delta_x;
     }
-    // The sum of what is seen is noise, while 1.7 radians went by.
+    // The sum of the measured flow is noise, while 1.7 rad passed.
     assert!(sum.abs() < 0.03, "{sum}");
     let mut simulation = drifting(8, Pose::hovering(5.0));
     let clock = simulation.clock.clone();

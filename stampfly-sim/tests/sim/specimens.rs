@@ -1,8 +1,8 @@
-//! Differences between specimens: the draws of the harsh world are compared with the figures that
-//! they come from, and the readings of the sensors with the truth.
+//! Differences between specimens: draws of the harsh world compared with the figures from which
+//! they come, and sensor readings compared with the truth.
 //!
-//! Seeds are fixed, so these tests always see the same specimens. The bounds hold for as many
-//! specimens of any other seeds.
+//! Seeds are fixed, so these tests always use the same specimens. The bounds hold for the same
+//! number of specimens of any other seeds.
 
 use nalgebra::Vector3;
 use stampfly_drivers::{Imu, OpticalFlow, RangeFinder};
@@ -10,7 +10,7 @@ use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::time::block_on;
 use stampfly_sim::{Conditions, Simulation, SimulationConfig};
 
-/// A vehicle without weight, motors and air keeps its velocity and its turning.
+/// A vehicle without weight, motors and air keeps its velocity and its rotation.
 fn drifting(seed: u64, pose: Pose, conditions: Conditions) -> Simulation {
     let plant = PlantParameters {
         gravity: 0.0,
@@ -27,19 +27,22 @@ fn drifting(seed: u64, pose: Pose, conditions: Conditions) -> Simulation {
     Simulation::new(&SimulationConfig { seed, plant, wind, pose, conditions, ..SimulationConfig::example() })
 }
 
-/// The conditions of a harsh world, whatever its battery.
+/// Conditions of a harsh world with any battery.
 fn harsh(seed: u64) -> Conditions {
     Conditions::harsh(seed, |_| true)
 }
 
-/// Are these drawn evenly from `low` to `high`, each measured with an error below `error`?
+/// Checks that values are drawn uniformly from `low` to `high`, each measured with an error below
+/// `error`.
 ///
-/// * None lies outside, and the outermost hundredths are not empty: of n even draws one lies there with 1 − 0.99ⁿ, which is 87 %
-///   of 200 and 98 % of 400; asked for is the outermost thirtieth, which 200 draws leave empty once in 900.
-/// * Mean: σ/√n with σ = (high − low)/√12. Standard deviation: σ·√0.2/√n, since the fourth moment of an even distribution is
-///   1.8 σ⁴ and the variance of s² is (1.8 − 1) σ⁴/n. Four standard errors are exceeded once in 16 000.
-/// * Kolmogorov and Smirnov: the largest distance between the shares below a value is above 1.95/√n once in a thousand. An error of the
-///   measurement moves a value by so much of the range.
+/// * No value lies outside, and the outermost parts are not empty. Of n uniform draws one lies in
+///   the outermost hundredth with probability 1 − 0.99ⁿ, 87 % for 200 and 98 % for 400; the test
+///   uses the outermost thirtieth, which 200 draws leave empty once in 900.
+/// * Mean: σ/√n with σ = (high − low)/√12. Standard deviation: σ·√0.2/√n, since the fourth moment
+///   of a uniform distribution is 1.8 σ⁴ and the variance of s² is (1.8 − 1) σ⁴/n. Four standard
+///   errors are exceeded once in 16 000.
+/// * Kolmogorov-Smirnov: the distance between empirical and uniform distribution exceeds 1.95/√n
+///   once in a thousand. A measurement error shifts a value by its share of the range.
 fn even(what: &str, draws: &[f64], [low, high]: [f64; 2], error: f64) {
     let mut draws = draws.to_vec();
     draws.sort_by(f64::total_cmp);
@@ -61,21 +64,20 @@ fn even(what: &str, draws: &[f64], [low, high]: [f64; 2], error: f64) {
     assert!(distance < 1.95 / n.sqrt() + error / range, "{what}: Kolmogorov's distance {distance}");
 }
 
-/// Correlation of pairs whose means are zero.
+/// Correlation of pairs with zero means.
 fn correlation(pairs: &[[f64; 2]]) -> f64 {
     let sum = |of: fn(&[f64; 2]) -> f64| pairs.iter().map(of).sum::<f64>();
     sum(|[x, y]| x * y) / (sum(|[x, _]| x * x) * sum(|[_, y]| y * y)).sqrt()
 }
 
-/// Two draws of their own: four standard errors, 1/√n each.
+/// Independent draws: four standard errors of the correlation, 1/√n each.
 fn independent(what: &str, pairs: &[[f64; 2]]) {
     let correlation = correlation(pairs);
     assert!(correlation.abs() < 4.0 / (pairs.len() as f64).sqrt(), "{what}: correlated, {correlation}");
 }
 
-/// Published StampFlys weigh 35 to 37 g, which is 2.8 % to either side; two families of
-/// measurements of its propellers lie 25 % apart, which is 12.5 %; the rotors' lag is 14 to 30 ms,
-/// which is 36 %.
+/// Published masses of StampFlys are 35 to 37 g, ±2.8 %; two families of measurements of its
+/// propellers differ by 25 %, ±12.5 %; the rotors' lag is 14 to 30 ms, ±36 %.
 #[test]
 fn mass_thrust_and_lag_lie_as_far_apart_as_what_is_published() {
     let conditions = harsh(1);
@@ -110,8 +112,8 @@ fn every_vehicle_is_drawn_evenly_and_its_numbers_independently() {
             independent(&format!("{what} and {other}"), &pairs);
         }
     }
-    // A flat body: what is farther from x or y is farther from z, and no moment is larger than the
-    // sum of the others.
+    // A flat body: a mass farther from x or y is farther from z, and no moment exceeds the sum of
+    // the others.
     for one in &drawn {
         let [x, y, z] = [one.inertia_x, one.inertia_y, one.inertia_z];
         let share = 0.5 * (x / plant.inertia_x + y / plant.inertia_y);
@@ -121,9 +123,9 @@ fn every_vehicle_is_drawn_evenly_and_its_numbers_independently() {
     assert_eq!(plant.under(&Conditions::GENTLE, 7).mass, plant.mass, "in the gentle world all are the same");
 }
 
-/// Forward and right flow over what is true, less one, at 2.5 rad/s for a second and a half.
+/// Measured forward and right flow relative to the truth, minus one, at 2.5 rad/s for 1.5 s.
 ///
-/// 180 pictures of 9 counts each, with noise of 0.4 counts: the sum has an error of 0.3 %.
+/// 180 pictures of 9 counts each with noise of 0.4 counts: the sum has an error of 0.3 %.
 fn flow_shares(seed: u64, conditions: &Conditions) -> [f64; 2] {
     let pose = Pose { velocity: Vector3::new(2.0, 2.0, 0.0), ..Pose::hovering(0.8) };
     let mut simulation = drifting(seed, pose, conditions.clone());
@@ -131,7 +133,7 @@ fn flow_shares(seed: u64, conditions: &Conditions) -> [f64; 2] {
     let (mut swept, mut time) = ([0.0f64; 2], 0.0f64);
     for read in 0..160 {
         let Ok(sample) = block_on(&clock, simulation.sensors.flow.next());
-        // The first reads hold what went by before.
+        // The first reads contain earlier motion.
         if read >= 10 {
             swept[0] += f64::from(sample.data.delta_x);
             swept[1] += f64::from(sample.data.delta_y);
@@ -141,10 +143,10 @@ fn flow_shares(seed: u64, conditions: &Conditions) -> [f64; 2] {
     swept.map(|swept| swept / (2.5 * time) - 1.0)
 }
 
-/// Four standard errors of the sum of 180 pictures, and a picture of 9 counts that is in it or not.
+/// Four standard errors of the sum of 180 pictures, plus one picture of 9 counts at the boundary.
 const FLOW_ERROR: f64 = 4.0 * 0.37 / 9.3 / 13.4 + 1.0 / 180.0;
 
-/// Flow: ±12 % from vehicle to vehicle, the same for both axes of one.
+/// Flow scale: ±12 % between vehicles, common to both axes.
 #[test]
 fn flow_sensors_count_more_or_less_by_their_scale() {
     assert_eq!(harsh(1).flow_scale, 0.12, "what carried recordings were found to differ by");
@@ -157,8 +159,7 @@ fn flow_sensors_count_more_or_less_by_their_scale() {
     assert!(apart < 2.0 * FLOW_ERROR, "one sensor has one scale: {apart}");
 }
 
-/// The axes of one sensor: 0.943 and 1.015 were found, which is 3.6 % to either side of their
-/// middle.
+/// Axes of one sensor: 0.943 and 1.015 were measured, ±3.6 % about their mean.
 #[test]
 fn the_axes_of_a_flow_sensor_differ_by_their_own_scale() {
     let bound = harsh(1).flow_axis_scale;
@@ -171,12 +172,11 @@ fn the_axes_of_a_flow_sensor_differ_by_their_own_scale() {
     independent("x and y", &shares);
 }
 
-/// The sum of what has been read falls behind by the flow times the delay, on the mean over all
-/// phases of picture and read.
+/// The accumulated flow lags by flow times delay, on average over all phases of picture and read.
 ///
-/// At 25 rad/s, so that the noise of 70 pictures, 0.37 counts each and another one in each flight,
-/// is 0.4 ms at the end and half of it on the mean; of 20 flights, 0.05 ms, four times that, and a
-/// hundredth of a picture for phases that are not quite even.
+/// At 25 rad/s the noise of 70 pictures (0.37 counts each, and again in the second flight) is 0.4
+/// ms at the end and half of it on average; for 20 flights 0.05 ms. The bound is four times that
+/// plus a hundredth of a picture for the phases, which are not exactly uniform.
 #[test]
 fn flow_is_as_late_as_its_delay() {
     let sums = |seed: u64, flow_delay: f64| {
@@ -202,7 +202,7 @@ fn flow_is_as_late_as_its_delay() {
     }
 }
 
-/// A picture is compared in the time of about the next one: 1/121 s, and half of that more or less.
+/// Comparing a picture takes about the time to the next: 1/121 s, ± half of it.
 #[test]
 fn the_delay_of_flow_is_about_that_of_a_picture() {
     let delays: Vec<_> = (0..500).map(|seed| harsh(seed).flow_delay).collect();
@@ -210,13 +210,12 @@ fn the_delay_of_flow_is_about_that_of_a_picture() {
     even("delay", &delays, [0.5 * picture, 1.5 * picture], 0.0005);
 }
 
-/// A per cent for each axis of accelerometer and gyroscope, beside what the chip itself has.
+/// Scale: 1 % for each axis of accelerometer and gyroscope, in addition to the chip's own.
 #[test]
 fn inertial_sensors_measure_more_or_less_by_their_scale() {
     let bound = harsh(1).imu_scale;
     assert_eq!(bound, 0.01);
-    // The axis by which the vehicle is turned, and what the gyroscope then measures less its
-    // offset.
+    // The axis about which the vehicle turns, and the gyroscope's reading minus its offset.
     let turned = |seed: u64, imu_scale: f64, axis: usize| {
         let rate = Vector3::from_fn(|row, _| if row == axis { 10.0 } else { 0.0 });
         let conditions = Conditions { imu_scale, ..Conditions::GENTLE };
@@ -233,14 +232,14 @@ fn inertial_sensors_measure_more_or_less_by_their_scale() {
     for seed in 0..200 {
         let mut share = [0.0; 6];
         for axis in 0..3 {
-            // The same chip with and without.
+            // The same chip with and without the condition.
             let [(gyro, accel), (plain_gyro, plain_accel)] = [bound, 0.0].map(|scale| turned(seed, scale, axis));
             share[axis] = accel[(axis, axis)] / plain_accel[(axis, axis)] - 1.0;
             share[3 + axis] = gyro / plain_gyro - 1.0;
         }
         shares.push(share);
     }
-    // The same noise in both, and counts of 0.001 rad/s.
+    // The noise is the same in both; resolution 0.001 rad/s.
     for channel in 0..6 {
         even(
             &format!("channel {channel}"),
@@ -255,7 +254,7 @@ fn inertial_sensors_measure_more_or_less_by_their_scale() {
     }
 }
 
-/// Scale, less one, and offset, m, of a range finder, from its means at 0.4 and at 2 m.
+/// Scale minus one, and offset, m, of a range finder, from its means at 0.4 and 2 m.
 fn range_errors(seed: u64, conditions: &Conditions) -> [f64; 2] {
     let mean = |height: f64| {
         let mut simulation = drifting(seed, Pose::hovering(height), conditions.clone());
@@ -272,13 +271,13 @@ fn range_errors(seed: u64, conditions: &Conditions) -> [f64; 2] {
     [scale - 1.0, near - 0.4 * scale]
 }
 
-/// Noise of 1.2 mm near and 4 mm far, over √40: 0.7 mm, four times that over the 1.6 m between, and
-/// the same in the offset.
+/// Noise of 1.2 mm near and 4 mm far divided by √40 is 0.7 mm; four times that over the 1.6 m
+/// between, and the same for the offset.
 const SCALE_ERROR: f64 = 4.0 * 0.0007 / 1.6;
 const OFFSET_ERROR: f64 = 4.0 * 0.0005;
 
-/// The data sheets' ranging error is 20 to 25 mm at 0.3 to 0.4 m: no specimen is farther off there,
-/// and some are as far.
+/// Ranging error of the data sheets: 20 to 25 mm at 0.3 to 0.4 m. No specimen exceeds it, and some
+/// reach it.
 #[test]
 fn range_finders_err_by_scale_and_offset_as_the_data_sheets_say() {
     let Conditions { range_scale, range_offset, .. } = harsh(1);
@@ -295,8 +294,8 @@ fn range_finders_err_by_scale_and_offset_as_the_data_sheets_say() {
     assert!(scale.abs() < SCALE_ERROR && offset.abs() < OFFSET_ERROR, "{scale}, {offset} m");
 }
 
-/// A flight record has 2.5 Pa in a hover, and the sign on another specimen is unknown: 0.3 m either
-/// way, and 0.6 m with what the floor adds. A metre of air weighs 11.77 Pa.
+/// A flight record shows 2.5 Pa in hover; the sign on another specimen is unknown: 0.3 m either
+/// way, and 0.6 m with the additional pressure at the floor. A metre of air is 11.77 Pa.
 #[test]
 fn propellers_press_or_suck_as_much_as_was_recorded() {
     let conditions: Vec<_> = (0..500).map(harsh).collect();

@@ -1,4 +1,4 @@
-//! The two ways to the registers of the BMI270 (DS 6): SPI with its byte without meaning, and I²C without it.
+//! Access to the BMI270's registers (DS 6): SPI with a dummy byte before read data, I²C without.
 
 use super::{ACCEL, Bmi270, FIFO_DATA, TIME, UPLOAD_DATA};
 use crate::chips::{Chip, I2cChip, SpiChip};
@@ -13,7 +13,7 @@ impl Bmi270 {
         self.shadow.copy_from_slice(&self.registers[usize::from(ACCEL)..usize::from(TIME)]);
     }
 
-    /// The register of the next byte, which is the following one except for data that come through a single register.
+    /// Returns the register of the next byte and advances, except at data ports.
     fn step(&mut self) -> u16 {
         let register = self.pointer;
         if register != FIFO_DATA && register != UPLOAD_DATA {
@@ -29,7 +29,7 @@ impl Bmi270 {
         }
     }
 
-    /// A transfer is over.
+    /// A transfer ends.
     fn end(&mut self, wrote: bool, now: Instant) {
         if wrote && self.accepts {
             let idle = if self.saves_power() { 450 } else { 2 };
@@ -55,7 +55,7 @@ impl SpiChip for Bmi270 {
         self.read(register, now) as u8
     }
 
-    // Asked for every byte of the FIFO, in which it does nothing.
+    // Called for every byte of a FIFO read, in which it does nothing.
     #[inline]
     fn take(&mut self, index: usize, byte: u8, now: Instant) {
         if index == 0 {
@@ -68,7 +68,8 @@ impl SpiChip for Bmi270 {
 
     fn release(&mut self, now: Instant) {
         let wrote = self.spi && self.command & 0x80 == 0;
-        // The rising edge chooses SPI, but not in the start-up, so not at the end of the transfer that resets.
+        // A rising edge selects SPI, except during start-up, hence not at the end of the transfer
+        // that resets.
         self.spi = now >= self.ready;
         self.end(wrote, now);
     }

@@ -1,26 +1,26 @@
-//! The FIFO of the BMI270 (DS 4.8): frames with or without a header, the oldest given up when it is full.
+//! FIFO of the BMI270 (DS 4.8): frames with or without a header; when full, the oldest are dropped.
 
 use std::collections::VecDeque;
 
-/// Bytes, with the configuration image the StampFly loads.
+/// Size, bytes, with the configuration image that the StampFly loads.
 const SIZE: usize = 2_048;
-/// Header of a frame that tells how many were lost.
+/// Header of a skip frame: number of dropped frames.
 const SKIP: u8 = 0x40;
-/// Header of the time of the last sample.
+/// Header of a frame with the time of the last sample.
 const TIME: u8 = 0x44;
-/// Header of the note that settings have changed.
+/// Header of a frame that reports changed settings.
 const CONFIGURATION: u8 = 0x48;
-/// What a read beyond the end gives.
+/// Byte read beyond the end.
 const EMPTY: u8 = 0x80;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Fifo {
     frames: VecDeque<Vec<u8>>,
-    /// Frames given up since the last skip frame was read.
+    /// Frames dropped since the last skip frame was read.
     skipped: u8,
-    /// Bytes of the first frame that have been read in this transfer.
+    /// Bytes of the first frame read in this transfer.
     offset: usize,
-    /// The time frame of this transfer, and how much of it has been read.
+    /// Time frame of this transfer, and the number of its bytes already read.
     time: Option<([u8; 4], usize)>,
 }
 
@@ -34,7 +34,7 @@ impl Fifo {
         self.frames.iter().map(Vec::len).sum::<usize>() + if self.skipped > 0 { 2 } else { 0 }
     }
 
-    /// Adds what the sensors have just measured, gyroscope before accelerometer.
+    /// Adds new samples, gyroscope before accelerometer.
     pub(super) fn push(&mut self, gyro: Option<[u8; 6]>, accel: Option<[u8; 6]>, header: bool, stop_on_full: bool) {
         let mut frame = Vec::with_capacity(13);
         if header {
@@ -45,7 +45,7 @@ impl Fifo {
         self.insert(frame, header, stop_on_full);
     }
 
-    /// Notes that settings have changed: 1 accelerometer, 2 gyroscope.
+    /// Adds a report of changed settings: 1 accelerometer, 2 gyroscope.
     pub(super) fn push_configuration(&mut self, what: u8) {
         self.insert(vec![CONFIGURATION, what, 0, 0, 0], true, false);
     }
@@ -64,8 +64,9 @@ impl Fifo {
         }
     }
 
-    /// The next byte. `time` is the frame to send at the end of the data, once per transfer.
+    /// The next byte. `time` is the time frame to send after the data, once per transfer.
     pub(super) fn pop(&mut self, time: Option<[u8; 3]>) -> u8 {
+        // A skip frame is inserted only between frames.
         if self.skipped > 0 && self.offset == 0 {
             self.frames.push_front(vec![SKIP, core::mem::take(&mut self.skipped)]);
         }
@@ -90,7 +91,7 @@ impl Fifo {
         }
     }
 
-    /// The transfer is over: a frame that was read in part will come again as a whole.
+    /// Ends a transfer: a frame that was read in part is repeated as a whole.
     pub(super) fn release(&mut self) {
         self.offset = 0;
         self.time = None;

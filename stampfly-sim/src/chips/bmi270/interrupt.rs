@@ -1,4 +1,4 @@
-//! Interrupt pin 1 of the BMI270 as the chip drives it: pulses, latching, level, and who waits for it.
+//! Interrupt pin 1 of the BMI270 as the chip drives it: pulses, latching, level, and waiting tasks.
 
 use core::task::Waker;
 use stampfly_types::{Duration, Instant};
@@ -9,7 +9,7 @@ const PULSE: Duration = Duration::from_micros(312);
 const OUTPUT: u8 = 0x08;
 const ACTIVE_HIGH: u8 = 0x02;
 
-/// The state of the pin in the chip.
+/// State of the pin in the chip.
 #[derive(Debug)]
 pub(super) struct Interrupt {
     latched: bool,
@@ -23,7 +23,7 @@ pub(super) struct Interrupt {
 }
 
 impl Default for Interrupt {
-    /// No output: the board pulls the pin up.
+    /// Not an output: the board's pull-up holds the pin high.
     fn default() -> Self {
         Self { latched: false, pulse: None, high: true, rises: 0, falls: 0, waiting: Vec::new() }
     }
@@ -38,7 +38,7 @@ impl Interrupt {
         self.pulse
     }
 
-    /// Whether a pulse has ended, told once.
+    /// Returns true once when a pulse has ended.
     pub(super) fn end_pulse(&mut self, now: Instant) -> bool {
         self.pulse.take_if(|end| *end <= now).is_some()
     }
@@ -47,13 +47,13 @@ impl Interrupt {
         self.latched = false;
     }
 
-    /// The chip restarts.
+    /// Restart of the chip.
     pub(super) fn stop(&mut self) {
         self.latched = false;
         self.pulse = None;
     }
 
-    /// Sets the level: whether there is something to say, whether that is latched, and the pin's register.
+    /// Sets the level from the interrupt request, the latch setting, and the pin's register.
     pub(super) fn drive(&mut self, request: bool, latches: bool, pin: u8) {
         self.latched = latches && (self.latched || request);
         let active = request || self.latched;
@@ -64,7 +64,7 @@ impl Interrupt {
         }
     }
 
-    /// Lets everybody who waits look again.
+    /// Wakes all waiting tasks, which check the pin again.
     pub(super) fn wake(&mut self) {
         self.waiting.drain(..).for_each(Waker::wake);
     }

@@ -1,9 +1,9 @@
 //! Interrupt pin 1 of the BMI270 as the processor sees it.
 //!
-//! Use [`InterruptPin`] to test drivers that wait for the chip. It implements embedded-hal's `InputPin` and
-//! embedded-hal-async's `Wait` on virtual time: a waiting task runs again at the next instant at which the chip can
-//! change the level by itself, and after every transfer. Edges are counted in the chip, so none is missed however late
-//! the task runs.
+//! For testing drivers that wait for the chip. [`InterruptPin`] implements embedded-hal's
+//! `InputPin` and embedded-hal-async's `Wait` on virtual time: a waiting task runs at the next
+//! instant at which the chip can change the level, and after every transfer. The chip counts edges,
+//! so none is missed when the task runs late.
 
 use super::Bmi270;
 use super::interrupt::Interrupt;
@@ -18,7 +18,7 @@ use embedded_hal::digital::{ErrorType, InputPin};
 use embedded_hal_async::digital::Wait;
 use std::rc::Rc;
 
-/// Interrupt pin 1 of an emulated BMI270. Comes from [`SpiPort::interrupt_pin`].
+/// Interrupt pin 1 of an emulated BMI270, from [`SpiPort::interrupt_pin`].
 ///
 /// ```
 /// use embedded_hal::digital::InputPin;
@@ -47,7 +47,7 @@ pub struct InterruptPin {
 }
 
 impl SpiPort<Bmi270> {
-    /// The chip's interrupt pin 1, with the pull-up of the board.
+    /// The chip's interrupt pin 1 with the board's pull-up.
     #[must_use]
     pub fn interrupt_pin(&self) -> InterruptPin {
         let (clock, chip) = self.chip();
@@ -56,7 +56,7 @@ impl SpiPort<Bmi270> {
 }
 
 impl InterruptPin {
-    /// What the pin is like now.
+    /// Reads the present state of the pin.
     fn look<T>(&self, at: impl FnOnce(&Interrupt) -> T) -> T {
         let mut chip = self.chip.borrow_mut();
         chip.update(self.clock.now());
@@ -74,7 +74,7 @@ impl InterruptPin {
                 waiting.push(context.waker().clone());
             }
             if let Some(next) = chip.next_event() {
-                // Leaves the deadline with the clock; it is not over yet.
+                // Polling once registers the deadline with the clock.
                 let _ = Pin::new(&mut self.clock.sleep_until(next)).poll(context);
             }
             Poll::Pending

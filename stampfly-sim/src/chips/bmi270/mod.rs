@@ -1,4 +1,4 @@
-//! The inertial sensor BMI270: Bosch BST-BMI270-DS000 ("DS" below), on SPI or I²C.
+//! Emulator of the inertial sensor BMI270: Bosch BST-BMI270-DS000 ("DS" below), on SPI or I²C.
 //!
 //! | register | content | after reset | DS |
 //! |---|---|---|---|
@@ -23,7 +23,7 @@
 //! | 0x55 | bit 0: interrupts are latched | 0 | 5.2.65 |
 //! | 0x58 | to pin 1: data ready (2), FIFO watermark (1) | 0 | 5.2.68 |
 //! | 0x59 | 0 prepares, 1 ends the upload | 0 | 5.2.69 |
-//! | 0x5B, 0x5C, 0x5E | word address (3:0, 11:4), data of the upload | 0 | 5.2.70 to 5.2.72 |
+//! | 0x38 | page 0: (5:3) result of the test command | 0 | |
 //! | 0x69 | bit 2: a test of the gyroscope runs | 0 | 5.2.75 |
 //! | 0x6D | accelerometer self test: on (0), positive (2), large (3) | 0 | 5.2.79 |
 //! | 0x6E | gyroscope self test: done (0), x, y, z in order (1 to 3) | 0 | 5.2.80 |
@@ -31,30 +31,33 @@
 //! | 0x7D | gyroscope (1), accelerometer (2), temperature (3) on | 0 | 5.2.99 |
 //! | 0x7E | 0xB6 resets, 0xB0 empties the FIFO, 0x02 tests the gyroscope | 0 | 5.2.100 |
 //!
-//! The section numbers of single registers follow the order of the register map and are *unverified*; the contents
-//! are those of the map in DS 5.1.
+//! The section numbers of single registers follow the order of the register map and are
+//! *unverified*; the contents are those of the map in DS 5.1.
 //!
-//! A read has one byte without meaning before the data (DS 6.3). The chip starts on I²C and takes the first rising
-//! edge of chip select as the choice of SPI, so the first transfer after power-on and after a reset is lost (DS 6.1).
-//! A read goes on to the next register, except at 0x26 and 0x5E. In advanced power save neither the FIFO nor the
-//! upload can be reached, and writes need 450 µs between them, otherwise 2 µs (DS 4.4, 6.5).
+//! A read has one dummy byte before the data (DS 6.3). The chip starts on I²C and switches to SPI
+//! at the first rising edge of chip select, so the first transfer after power-on and after a reset
+//! is lost (DS 6.1). A read continues with the next register, except at 0x26 and 0x5E. In advanced
+//! power save neither the FIFO nor the upload is accessible, and writes need 450 µs between them,
+//! otherwise 2 µs (DS 4.4, 6.5).
 //!
-//! The chip can also be asked over I²C, at 0x68 or 0x69, as long as chip select stays high; then a read has no byte
-//! without meaning (DS 6.4).
+//! Over I²C, at 0x68 or 0x69, the chip answers as long as chip select stays high; reads then have
+//! no dummy byte (DS 6.4).
 //!
-//! *Unverified* about pin 1: that it follows the watermark as long as it is not latched, that data ready is a pulse of
-//! 312 µs, and that a latched one is set again at once where its cause persists. On the board the pin has a pull-up, so
-//! it is high while it is no output, and open drain makes no difference. About the self tests: see `self_test.rs`.
+//! *Unverified* about pin 1: that it follows the watermark while it is not latched, that data ready
+//! is a pulse of 312 µs, and that a latched interrupt is set again immediately while its cause
+//! persists. On the board the pin has a pull-up, so it is high while it is not an output, and open
+//! drain makes no difference. For the self-tests see `self_test.rs`.
 //!
-//! The time counts sixteen ticks a sample and a sample falls on a multiple of them: Bosch says so of this part's
-//! siblings (BMI160, 2.3.1 table 11; BMA400, "Sensor Time") and their drivers rely on it.
+//! The time counts sixteen ticks per sample, and samples fall on multiples of sixteen: Bosch
+//! documents this for related parts (BMI160, 2.3.1 table 11; BMA400, "Sensor Time"), and their
+//! drivers rely on it.
 //!
-//! *Unverified*: that accesses in the 2 ms of a start are ignored and read as zero; that writes too close together are
-//! lost; that data of an upload that was not announced by a zero in 0x59 is ignored; that sensors do not start before the upload has succeeded; 10 ms from the end of an upload to its result;
-//! first data 2 ms (accelerometer) and 45 ms (gyroscope) after being switched on; the plain mean as filter at rates
-//! below 1600 Hz; the four bytes after header 0x48. Not modelled: rates above 1600 Hz, interrupt pins, FIFO
-//! downsampling and watermark, features, the auxiliary bus, filter delay.
-
+//! *Unverified*: accesses during the 2 ms of a start are ignored and read as zero; writes too close
+//! together are lost; upload data not announced by a zero in 0x59 are ignored; sensors do not start
+//! before the upload has succeeded; 10 ms from the end of an upload to its result; first data 2 ms
+//! (accelerometer) and 45 ms (gyroscope) after being switched on; a plain mean as filter at rates
+//! below 1600 Hz; the four bytes after header 0x48. Not modelled: rates above 1600 Hz, interrupt
+//! pin 2, FIFO downsampling, features, the auxiliary bus, filter delay.
 mod bus;
 mod fifo;
 mod interrupt;
@@ -86,10 +89,10 @@ const TEMPERATURE: u16 = 0x22;
 const FIFO_LENGTH: u16 = 0x24;
 const FIFO_DATA: u16 = 0x26;
 const FEATURE_PAGE: u16 = 0x2F;
-/// On page 1: longest burst, and what a test of the gyroscope is to be.
+/// Page 1: longest burst, and selection of the gyroscope's test.
 const TEST_WORD_LOW: u16 = 0x32;
 const TEST_WORD_HIGH: u16 = 0x33;
-/// On page 0: what became of the command to test.
+/// Page 0: result of the test command.
 const TEST_STATUS: u16 = 0x38;
 const ACCEL_SETTINGS: u16 = 0x40;
 const ACCEL_RANGE: u16 = 0x41;
@@ -126,14 +129,14 @@ const AFTER_RESET: [(u16, u8); 11] = [
     (TEMPERATURE + 1, 0x80),
     (POWER_SAVE, 0x03),
 ];
-/// In [`TEST_STATUS`]: the command came without its preparation.
+/// [`TEST_STATUS`]: the test command was not prepared.
 const NOT_PREPARED: u8 = 0x08;
 const READY_ACCEL: u8 = 0x80;
 const READY_GYRO: u8 = 0x40;
 const COMMAND_READY: u8 = 0x10;
-/// The FIFO has reached its watermark, as interrupt status and as what pin 1 may say.
+/// FIFO at its watermark, in the interrupt status and in the map of pin 1.
 const AT_WATERMARK: u8 = 0x02;
-/// Data ready, as what pin 1 may say.
+/// Data ready, in the map of pin 1.
 const DATA_READY: u8 = 0x04;
 const START_UP: Duration = Duration::from_micros(2_000);
 const UPLOAD_CHECK: Duration = Duration::from_micros(10_000);
@@ -141,10 +144,10 @@ const ACCEL_START: Duration = Duration::from_micros(2_000);
 const GYRO_START: Duration = Duration::from_micros(45_000);
 /// Rate code of 1600 Hz.
 const FASTEST: u8 = 0x0C;
-/// Bytes of the memory for the upload.
+/// Size of the memory for the upload, bytes.
 const UPLOAD_SIZE: usize = 8_192;
 
-/// The emulator. The same seed is the same specimen as [`ImuModel`](crate::sensors::ImuModel).
+/// The emulator. The same seed gives the same specimen as [`ImuModel`](crate::sensors::ImuModel).
 ///
 /// ```
 /// use embedded_hal::spi::SpiDevice;
@@ -176,42 +179,43 @@ pub struct Bmi270 {
     registers: [u8; 128],
     /// End of the start-up.
     ready: Instant,
-    /// Beginning of the chip's time.
+    /// Origin of the chip's time.
     epoch: Instant,
     spi: bool,
-    /// Before this instant the chip takes no further write.
+    /// Writes before this instant are ignored.
     idle_until: Instant,
-    /// Whether the running transfer came late enough to be taken.
+    /// The present transfer began late enough to be accepted.
     accepts: bool,
-    /// Whether the upload has been announced.
+    /// The upload has been announced.
     prepared: bool,
     /// End of the check of an upload.
     check: Option<Instant>,
     /// Byte address of the upload.
     address: usize,
-    /// When accelerometer and gyroscope were switched on, if they are.
+    /// Instants at which accelerometer and gyroscope were switched on; `None` while off.
     on: [Option<Instant>; 2],
-    /// Sums of the samples since the last output, accelerometer and gyroscope, and how many.
+    /// Sums and numbers of samples since the last output, accelerometer and gyroscope.
     sums: [([f64; 3], u64); 2],
     fifo: Fifo,
     interrupt: Interrupt,
     self_test: SelfTest,
-    /// The features' word about tests of the gyroscope, and their answer.
+    /// The features' control word and result of gyroscope tests.
     test_word: [u8; 2],
     test_status: u8,
-    /// The sensing elements do not move.
+    /// The sensing elements are broken.
     broken: bool,
     flaw: Option<Flaw>,
-    /// The address byte of this transfer.
+    /// Address byte of this transfer.
     command: u8,
     pointer: u16,
-    /// The data registers as the running transfer sees them.
+    /// Copy of the data registers at the start of the present transfer.
     shadow: [u8; 12],
 }
 
 impl Bmi270 {
-    /// A chip that has just been powered. `image` is the configuration that its check will accept, at most 8192 bytes:
-    /// the maker's file, or any stand-in. `vibration` is that of [`SimulationConfig`](crate::SimulationConfig).
+    /// A chip after power-on. `image` is the configuration that its check accepts, at most 8192
+    /// bytes: the manufacturer's file or a placeholder. `vibration` is that of
+    /// [`SimulationConfig`](crate::SimulationConfig).
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, vibration: f64, image: &[u8]) -> Self {
         let now = clock.now();
@@ -291,7 +295,7 @@ impl Bmi270 {
         self.end_pulse(now);
     }
 
-    /// The earliest instant at which something can happen without a transfer.
+    /// The earliest instant at which the state can change without a transfer.
     fn next_event(&self) -> Option<Instant> {
         let sample = (self.on != [None; 2]).then(|| self.schedule.instant(self.tick));
         [sample, self.check, self.interrupt.pulse_ends()].into_iter().flatten().min()
@@ -303,13 +307,13 @@ impl Bmi270 {
         }
     }
 
-    /// Whether the FIFO holds as much as its watermark says, which is at least a byte (DS 4.8).
+    /// True if the FIFO has reached its watermark, which is at least one byte (DS 4.8).
     fn at_watermark(&self) -> bool {
         let bytes = usize::from(self.register(WATERMARK)) | usize::from(self.register(WATERMARK + 1) & 0x1F) << 8;
         self.fifo.len() >= bytes.max(1)
     }
 
-    /// Sets pin 1 as the settings and what there is to say want it.
+    /// Sets pin 1 according to settings and interrupt causes.
     fn drive_pin(&mut self) {
         let map = self.register(INTERRUPT_MAP);
         let request = map & AT_WATERMARK != 0 && self.at_watermark()

@@ -1,4 +1,4 @@
-//! What reading and writing the BMI270's registers does, beside what it reads and writes.
+//! Side effects of reading and writing the BMI270's registers.
 
 use super::{
     ACCEL, ACCEL_SETTINGS, AFTER_RESET, Bmi270, COMMAND, COMMAND_READY, EVENT, FEATURE_PAGE, FIFO_CONTENT, FIFO_DATA,
@@ -23,7 +23,7 @@ impl Chip for Bmi270 {
             ACCEL..TIME => {
                 let (first, flag) = if register < GYRO { (ACCEL, READY_ACCEL) } else { (GYRO, READY_GYRO) };
                 let place = usize::from(first - ACCEL);
-                // What arrived during this transfer has not been read.
+                // Data that arrived during this transfer are still unread.
                 if self.shadow[place..place + 6] == self.registers[usize::from(first)..usize::from(first) + 6] {
                     self.set(STATUS, self.register(STATUS) & !flag);
                 }
@@ -100,7 +100,7 @@ impl Chip for Bmi270 {
                     self.self_test.begin_gyro(now);
                     self.test_status = 0;
                 } else {
-                    // What was not prepared for is over at once.
+                    // A test without preparation ends immediately.
                     self.test_status = NOT_PREPARED;
                     self.set(GYRO_TEST, self.register(GYRO_TEST) & !0x04);
                 }
@@ -108,7 +108,7 @@ impl Chip for Bmi270 {
             TEST_WORD_LOW | TEST_WORD_HIGH if self.register(FEATURE_PAGE) == 1 => {
                 self.test_word[usize::from(register - TEST_WORD_LOW)] = value;
             }
-            // What the features say on page 0 is read-only.
+            // Results on feature page 0 are read-only.
             0x30..=0x3F if self.register(FEATURE_PAGE) == 0 => {}
             COMMAND | GYRO_SELF_TEST => {}
             POWER => {

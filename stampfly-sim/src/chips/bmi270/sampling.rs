@@ -1,4 +1,4 @@
-//! How the BMI270 samples: from what is to be felt, 1600 times a second, to counts in registers, FIFO and on the pin.
+//! Sampling of the BMI270: from the physics at 1600 Hz to counts in registers, FIFO and interrupts.
 
 use super::{
     ACCEL, ACCEL_RANGE, ACCEL_SELF_TEST, ACCEL_SETTINGS, ACCEL_START, AT_WATERMARK, Bmi270, EVENT, FASTEST,
@@ -10,7 +10,8 @@ use crate::sensors::imu::to_counts;
 use stampfly_types::{GRAVITY, Instant};
 
 impl Bmi270 {
-    /// Samples at 1600 Hz per output of sensor 0 or 1; none where the rate is not allowed (DS 5.2.45, 5.2.47).
+    /// Samples at 1600 Hz per output of sensor 0 or 1; `None` for a rate that is not allowed (DS
+    /// 5.2.45, 5.2.47).
     fn divider(&self, sensor: usize) -> Option<u64> {
         let (register, slowest) = [(ACCEL_SETTINGS, 1), (GYRO_SETTINGS, 6)][sensor];
         let code = self.register(register) & 0x0F;
@@ -27,12 +28,12 @@ impl Bmi270 {
         }
     }
 
-    /// One tick of the sensors.
+    /// One sample of both sensors.
     pub(super) fn sample(&mut self, at: Instant) {
         let [ax, ay, az, gx, gy, gz] = self.physics.sample(at);
         let [[ax, ay, az], [gx, gy, gz]] = [[ax, ay, az], [gx, gy, gz]].map(|body| Flaw::turn(self.flaw, body));
         let force = self.self_test.deflect(self.register(ACCEL_SELF_TEST));
-        // Body is (y, x, −z) of the chip as it is soldered.
+        // The chip is mounted such that body is (y, x, −z) of the chip.
         let axes = [[ay + force[0], ax + force[1], -az + force[2]], [gy, gx, -gz]];
         let axes = if self.broken { [[0.0; 3]; 2] } else { axes };
         let mut outputs = [None; 2];
@@ -43,6 +44,7 @@ impl Bmi270 {
             let (sum, count) = &mut self.sums[sensor];
             sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
             *count += 1;
+            // Lower rates output the mean of the samples in between.
             if !self.tick.is_multiple_of(divider) {
                 continue;
             }
@@ -78,7 +80,7 @@ impl Bmi270 {
         }
     }
 
-    /// Switches the sensors as the power register says.
+    /// Switches the sensors on or off according to the power register.
     pub(super) fn switch(&mut self, now: Instant) {
         let power = self.register(POWER);
         for (sensor, bit) in [(0, 4), (1, 2)] {
@@ -90,7 +92,7 @@ impl Bmi270 {
         }
     }
 
-    /// Looks whether the rates are allowed and tells by the event register.
+    /// Checks the rates and reports invalid ones in the event register.
     pub(super) fn check_settings(&mut self) {
         let refused = u8::from(self.divider(0).is_none()) | u8::from(self.divider(1).is_none()) << 1;
         self.set(EVENT, self.register(EVENT) & !0x1C | refused << 2);

@@ -1,8 +1,9 @@
-//! The inertial sensor MPU-6000: InvenSense's register map RM-MPU-6000A 4.2 ("RM") and product specification PS-MPU-6000A 3.4 ("PS"), on SPI.
+//! Emulator of the inertial sensor MPU-6000: InvenSense's register map RM-MPU-6000A 4.2 ("RM") and
+//! product specification PS-MPU-6000A 3.4 ("PS"), on SPI.
 //!
 //! | register | content | after reset | RM |
 //! |---|---|---|---|
-//! | 0x0D–0x10 | the factory's answers to the self test, five bits an axis and sensor | a specimen's | 4.1 |
+//! | 0x0D–0x10 | factory trim of the self-test, five bits per axis and sensor | a specimen's | 4.1 |
 //! | 0x19 | divider of the sample rate, less one | 0 | 4.2 |
 //! | 0x1A | low-pass (2:0); with 0 and 7 the gyroscope has 8 kHz, otherwise 1 kHz | 0 | 4.3 |
 //! | 0x1B, 0x1C | gyroscope, accelerometer: self test (7:5), range (4:3) | 0 | 4.4, 4.5 |
@@ -13,15 +14,19 @@
 //! | 0x6B | reset (7), sleep (6), temperature off (3), clock (2:0) | 0x40 | 4.30 |
 //! | 0x75 | identity 0x68 | | 4.34 |
 //!
-//! Bit 7 of 0x6B resets; 0x08 is the temperature's switch and resets nothing. After a reset the chip sleeps, and its data are zero. A burst of the data
-//! is of one instant: they are copied when the chip select falls (RM 4.17). The accelerometer has 1 kHz; the registers repeat its samples when the rate
-//! is higher (RM 4.2). Sensor and interrupt registers may be read at up to 20 MHz, all others at 1 MHz (PS 6.5).
+//! Bit 7 of 0x6B resets; 0x08 switches the temperature sensor and resets nothing. After a reset the
+//! chip sleeps and its data are zero. A burst read of the data has one instant: the data are copied
+//! when the chip select falls (RM 4.17). The accelerometer has 1 kHz; its samples repeat at higher
+//! rates (RM 4.2). Sensor and interrupt registers may be read at up to 20 MHz, all others are
+//! limited to 1 MHz (PS 6.5).
 //!
-//! *Unverified*: that reads and writes of the other registers on a faster clock give all ones and are lost; that the chip is deaf for 100 ms after
-//! power-on and after a reset (the sheets say to wait so long); that the gyroscope's first data are there 30 ms after waking (PS 6.1 says when they
-//! are good), and the accelerometer's at once; the filter, which is one of first order; that all registers that are not named read back what is
-//! written; that a clock that is stopped freezes the data. Section numbers follow the order of the register map.
-//! Not modelled: FIFO, interrupt pin, I²C and the bus for other sensors, low-power cycles, axes in standby, motion detection, drift.
+//! *Unverified*: on a faster clock the other registers read all ones and ignore writes; the chip
+//! does not respond for 100 ms after power-on and after a reset (the sheets require this wait); the
+//! gyroscope's first data come 30 ms after waking (PS 6.1 says when they are valid), and the
+//! accelerometer's immediately; the filter, a first-order low-pass; registers not named here read
+//! back the value written; a stopped clock freezes the data. Section numbers follow the order of
+//! the register map. Not modelled: FIFO, interrupt pin, I²C and the auxiliary bus, low-power
+//! cycles, axes in standby, motion detection, drift.
 
 pub(crate) mod physics;
 
@@ -43,14 +48,14 @@ const DATA: usize = 0x3B;
 const PATH_RESET: u16 = 0x68;
 const POWER: u16 = 0x6B;
 const IDENTITY: u16 = 0x75;
-/// From power-on, and from a reset, to the first access (PS 6.3; RM 4.30).
+/// Time from power-on or reset to the first access (PS 6.3; RM 4.30).
 const START_UP: Duration = Duration::from_micros(100_000);
-/// From waking to the gyroscope's data (PS 6.1).
+/// Time from waking to the gyroscope's data (PS 6.1).
 const GYRO_START: Duration = Duration::from_micros(30_000);
-/// A byte at 1 MHz, less what counting whole microseconds takes.
+/// Least time of a byte at 1 MHz, minus the rounding to whole microseconds.
 const SLOW_BYTE: Duration = Duration::from_micros(7);
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// The factory's answers of the specimen, of x, y, z: accelerometer, gyroscope; five bits each.
+/// Factory trim of the specimen for x, y, z: accelerometer, gyroscope; five bits each.
 const TRIM: [[u8; 3]; 2] = [[14, 17, 11], [12, 15, 18]];
 
 /// The emulator.
@@ -80,23 +85,23 @@ pub struct Mpu6000 {
     registers: [u8; 128],
     /// End of the start-up.
     ready: Instant,
-    /// When it woke; `None` while it sleeps.
+    /// Instant of waking; `None` while asleep.
     awake: Option<Instant>,
-    /// Requests to wake that it has not heard since the last reset.
+    /// Wake-up requests ignored since the last reset.
     slept: u32,
-    /// Accelerometer and gyroscope as they were last sampled, counts.
+    /// Last samples of accelerometer and gyroscope, counts.
     sampled: [[i16; 3]; 2],
     broken: bool,
     flaw: Option<Flaw>,
-    /// The address byte of this transfer, and when it came.
+    /// Address byte of this transfer, and its instant.
     command: u8,
     commanded: Instant,
-    /// The data as they were when this transfer began.
+    /// Copy of the data at the start of this transfer.
     shadow: [u8; 14],
 }
 
 impl Mpu6000 {
-    /// A chip that has just been powered. `vibration` is that of [`SimulationConfig`](crate::SimulationConfig).
+    /// A chip after power-on. `vibration` is that of [`SimulationConfig`](crate::SimulationConfig).
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, vibration: f64) -> Self {
         let now = clock.now();
@@ -125,12 +130,12 @@ impl Mpu6000 {
         self.registers[usize::from(register & 0x7F)]
     }
 
-    /// Everything up to now has happened.
+    /// Advances the chip to `now`.
     fn update(&mut self, now: Instant) {
         while self.schedule.instant(self.tick) <= now {
             let (tick, at) = (self.tick, self.schedule.instant(self.tick));
             self.tick += 1;
-            // A clock that is stopped (RM 4.30).
+            // The clock is stopped (RM 4.30).
             if self.register(POWER) & 7 == 7 {
                 continue;
             }
@@ -145,11 +150,12 @@ impl Mpu6000 {
         let fast = filter == 0 || filter == 7;
         self.physics.tick(tick, filter % 7, at);
         let [accel, gyro] = self.physics.filtered().map(|body| Flaw::turn(self.flaw, body));
-        // Body is (y, x, −z) of the chip as it is soldered.
+        // The chip is mounted such that body is (y, x, −z) of the chip.
         let axes = [[accel[1], accel[0], -accel[2]], [gyro[1], gyro[0], -gyro[2]]];
         if tick.is_multiple_of(ACCEL_TICKS) {
             self.sampled[0] = self.convert(0, axes[0]);
         }
+        // With a filter the gyroscope has 1 kHz as well.
         if (fast || tick.is_multiple_of(ACCEL_TICKS)) && at.since(awake) >= GYRO_START {
             self.sampled[1] = self.convert(1, axes[1]);
         }
@@ -159,7 +165,7 @@ impl Mpu6000 {
         }
     }
 
-    /// Counts of one sensor (PS 6.1, 6.2), with what the self test adds (RM 4.1).
+    /// Counts of one sensor (PS 6.1, 6.2), including the self-test response (RM 4.1).
     fn convert(&self, sensor: usize, axes: [f64; 3]) -> [i16; 3] {
         let config = self.register([ACCEL_CONFIG, GYRO_CONFIG][sensor]);
         let range = config >> 3 & 3;
@@ -176,19 +182,19 @@ impl Mpu6000 {
             let tested = config >> (7 - axis) & 1 != 0;
             let answer = match (tested, sensor) {
                 (false, _) => 0.0,
-                // In counts at ±8 g and ±250 °/s.
+                // Factory trim in counts at ±8 g and ±250 °/s.
                 (true, 0) => 4096.0 * 0.34 * libm::pow(0.92 / 0.34, code / 30.0) / 4096.0 * f64::from(GRAVITY),
                 (true, _) => {
                     let sign = if axis == 1 { -1.0 } else { 1.0 };
                     sign * 25.0 * 131.0 * libm::pow(1.046, code) / 131.0 * DEGREE
                 }
             };
-            // 3 % off what the factory has measured.
+            // 3 % deviation from the factory trim.
             to_counts(axes[axis] + 1.03 * answer, scale)
         })
     }
 
-    /// Copies what was sampled to the data registers.
+    /// Copies the last samples to the data registers.
     fn publish(&mut self, at: Instant) {
         let temperature = if self.register(POWER) & 8 == 0 {
             to_counts(self.physics.temperature(at) - 36.53, 340.0)
@@ -202,7 +208,8 @@ impl Mpu6000 {
         self.registers[usize::from(INTERRUPT_STATUS)] |= 1;
     }
 
-    /// May this register be reached on a clock with these bytes (PS 6.5)?
+    /// True if this register is accessible on the present clock, judged by the time since the
+    /// address byte (PS 6.5).
     fn is_reachable(&self, now: Instant) -> bool {
         let register = usize::from(self.command & 0x7F);
         let reads_data = self.command & 0x80 != 0 && (usize::from(INTERRUPT_STATUS)..DATA + 14).contains(&register);
@@ -251,7 +258,7 @@ impl Chip for Mpu6000 {
                 let awake = value & 0x40 == 0;
                 self.awake = awake.then(|| self.awake.unwrap_or(now));
             }
-            // Clears itself.
+            // The bits clear themselves.
             PATH_RESET if value & 7 != 0 => {
                 self.clear_data();
                 self.awake = self.awake.map(|_| now);
@@ -265,7 +272,8 @@ impl Chip for Mpu6000 {
         self.registers = [0; 128];
         self.registers[usize::from(POWER)] = 0x40;
         let [accel, gyro] = TRIM;
-        // The upper three bits of an accelerometer's, and all of a gyroscope's; the lower two bits are in the fourth (RM 4.1).
+        // Registers 0x0D to 0x0F: upper three bits of the accelerometer's trim and all of the
+        // gyroscope's. 0x10: lower two bits of the accelerometer's (RM 4.1).
         for axis in 0..3 {
             self.registers[SELF_TEST + axis] = accel[axis] >> 2 << 5 | gyro[axis];
             self.registers[SELF_TEST + 3] |= (accel[axis] & 3) << (4 - 2 * axis);

@@ -1,4 +1,5 @@
-//! What an MPU-6000 feels, 8000 times a second, before and after its low-pass (MPU-6000 product specification 3.4, "PS"; register map 4.2, "RM").
+//! Physics of an MPU-6000 at 8 kHz, before and after its low-pass filter (MPU-6000 product
+//! specification 3.4, "PS"; register map 4.2, "RM").
 
 use crate::noise::Noise;
 use crate::sensors::mounting::Mounting;
@@ -9,13 +10,13 @@ use crate::world::World;
 use nalgebra::Vector3;
 use stampfly_types::{GRAVITY, Instant};
 
-/// Ticks of the gyroscope, Hz (PS 7.4, RM 4.2).
+/// Rate of the gyroscope, Hz (PS 7.4, RM 4.2).
 pub(crate) const RATE: f64 = 8_000.0;
-/// Ticks to a sample of the accelerometer, 1 kHz (PS 7.5).
+/// Gyroscope ticks per sample of the accelerometer, which has 1 kHz (PS 7.5).
 pub(crate) const ACCEL_TICKS: u64 = 8;
-/// The clock with a gyroscope as its reference is good to 1 % (PS 6.6).
+/// Tolerance of the clock with a gyroscope as reference (PS 6.6).
 const CLOCK: f64 = 0.01;
-/// Stream of this chip; no sensor has this number.
+/// Random streams of this chip; no sensor uses these numbers.
 const STREAM: u64 = 104;
 const VIBRATION_STREAM: u64 = 105;
 /// Noise densities (PS 6.1, 6.2): 0.005 °/s/√Hz, 400 µg/√Hz.
@@ -24,18 +25,18 @@ const ACCEL_DENSITY: f64 = 400e-6 * GRAVITY as f64;
 /// Offsets at 25 °C (PS 6.1, 6.2): ±20 °/s; ±50 mg in x and y, ±80 mg in z.
 const GYRO_OFFSET: f64 = 20.0 * DEGREE;
 const ACCEL_OFFSET: [f64; 3] = [0.05, 0.05, 0.08];
-/// Scale, 3 % either way (PS 6.1, 6.2).
+/// Bound of the scale error (PS 6.1, 6.2).
 const SCALE: f64 = 0.03;
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Bandwidths of accelerometer and gyroscope by the filter's number, Hz (RM 4.3).
+/// Bandwidths of accelerometer and gyroscope by filter setting, Hz (RM 4.3).
 const BANDWIDTH: [[f64; 2]; 7] =
     [[260.0, 256.0], [184.0, 188.0], [94.0, 98.0], [44.0, 42.0], [21.0, 20.0], [10.0, 10.0], [5.0, 5.0]];
 
 #[derive(Debug)]
 pub(crate) struct Physics {
     world: World,
-    /// `None` where it should be.
+    /// Mounting error, if the conditions have one.
     mounting: Option<Mounting>,
     noise: Noise,
     vibration: Vibration,
@@ -44,7 +45,7 @@ pub(crate) struct Physics {
     gyro_offset: Vector3<f64>,
     accel_scale: Vector3<f64>,
     gyro_scale: Vector3<f64>,
-    /// Accelerometer x, y, z in m/s², gyroscope x, y, z in rad/s, body, behind the low-pass.
+    /// Accelerometer x, y, z, m/s², and gyroscope x, y, z, rad/s, body, after the low-pass filter.
     filtered: [f64; 6],
 }
 
@@ -70,7 +71,8 @@ impl Physics {
         (physics, schedule)
     }
 
-    /// One tick with the low-pass of this number, as a filter of first order. The accelerometer's are taken every eighth time.
+    /// One tick with this filter setting, modelled as a first-order low-pass. The accelerometer is
+    /// sampled every eighth tick.
     pub fn tick(&mut self, tick: u64, filter: u8, at: Instant) {
         let motion = self.world.inertial_at(at);
         let shake = self.vibration.step(&motion.rotor_speed);
@@ -89,6 +91,7 @@ impl Physics {
                 continue;
             }
             let rate = RATE / ticks as f64;
+            // First-order low-pass with this corner frequency.
             let share = 1.0 - libm::exp(-core::f64::consts::TAU * bandwidth / rate);
             let noise = self.noise.normal3() * (density * libm::sqrt(rate / 2.0));
             for axis in 0..3 {
@@ -98,13 +101,13 @@ impl Physics {
         }
     }
 
-    /// Accelerometer and gyroscope behind the low-pass.
+    /// Accelerometer and gyroscope after the low-pass filter.
     pub fn filtered(&self) -> [[f64; 3]; 2] {
         let [ax, ay, az, gx, gy, gz] = self.filtered;
         [[ax, ay, az], [gx, gy, gz]]
     }
 
-    /// Temperature of the die, °C.
+    /// Die temperature, °C.
     pub fn temperature(&self, at: Instant) -> f64 {
         let minutes = f64::from(at.since(self.start).seconds()) / 60.0;
         25.0 + 10.0 * minutes / (minutes + 2.0) + self.world.warmth_at(at)

@@ -1,6 +1,7 @@
-//! The air between radios: who is heard where, what is lost, and what two at once make of each other.
+//! Radio channel between nRF24L01s: propagation, loss, collisions.
 //!
-//! Everything that radios do by themselves happens here, in the order of time: [`Air`] goes from one event to the next whenever anybody looks at it.
+//! All autonomous actions of radios happen here in the order of time: [`Air`] advances event by
+//! event on every access.
 
 use super::frame::{AirRate, Content};
 use super::radio::{Emission, Radio};
@@ -11,14 +12,15 @@ use core::task::Waker;
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// Stream of what is lost; no sensor has this number.
+/// Random stream of losses; no sensor uses this number.
 const STREAM: u64 = 103;
 /// Bits of the preamble (7.3.1).
 const PREAMBLE: u64 = 8;
-/// No packet is as long: 32 bytes at 250 kbit/s and everything around them are 1.4 ms.
+/// Longer than any packet: 32 bytes at 250 kbit/s with overhead take 1.4 ms.
 const LONGEST: Duration = Duration::from_micros(2_000);
 
-/// A packet of somebody who is no emulated chip: plain ShockBurst, without control field and acknowledgement.
+/// A packet from a sender that is not an emulated chip: plain ShockBurst, without control field and
+/// acknowledgement.
 ///
 /// ```
 /// use stampfly_sim::chips::{Air, AirPacket, AirRate};
@@ -31,26 +33,26 @@ const LONGEST: Duration = Duration::from_micros(2_000);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AirPacket<'a> {
-    /// 2400 MHz and so many.
+    /// Channel: frequency in MHz above 2400.
     pub channel: u8,
-    /// Its speed.
+    /// Data rate.
     pub rate: AirRate,
-    /// 3 to 5 bytes in the order of the chip's register: the first one is the least significant.
+    /// 3 to 5 bytes in the order of the chip's register: least significant byte first.
     pub address: &'a [u8],
-    /// Up to 32 bytes.
+    /// Payload, up to 32 bytes.
     pub payload: &'a [u8],
-    /// Bytes of the CRC, 0 to 2.
+    /// Length of the CRC, 0 to 2 bytes.
     pub crc: u8,
 }
 
-/// What somebody sends.
+/// A transmission on the air.
 #[derive(Debug)]
 struct Transmission {
     sender: Option<usize>,
     emission: Emission,
     from: Instant,
     until: Instant,
-    /// The bit that arrives wrongly, everywhere.
+    /// The bit that is received wrongly by all receivers.
     wrong: Option<usize>,
     delivered: bool,
 }
@@ -66,15 +68,16 @@ struct State {
     waiting: Vec<Waker>,
 }
 
-/// The air that radios share. Clones are the same air.
+/// The radio channel shared by radios. Clones are the same channel.
 ///
-/// A packet that is lost arrives with a wrong bit, so that it is the receiver's CRC that refuses it; without one it is taken for
-/// good. On a jammed channel, and where two packets overlap, nothing arrives. Everybody is in range of everybody.
+/// A lost packet arrives with a wrong bit, so that the receiver's CRC rejects it; without a CRC it
+/// is accepted. On a jammed channel, and where two packets overlap, nothing is received. All radios
+/// are in range of each other.
 #[derive(Clone, Debug)]
 pub struct Air(Rc<RefCell<State>>);
 
 impl Air {
-    /// Clear air. The seed decides what is lost.
+    /// A clear channel. `seed` draws the losses.
     #[must_use]
     pub fn new(clock: &Clock, seed: u64) -> Self {
         Self(Rc::new(RefCell::new(State {
@@ -88,12 +91,12 @@ impl Air {
         })))
     }
 
-    /// From now on this share of packets is lost, 0 to 1.
+    /// Sets the share of lost packets, 0 to 1.
     pub fn set_loss(&self, share: f64) {
         self.0.borrow_mut().loss = share;
     }
 
-    /// From now on somebody else fills this channel, or no longer.
+    /// Jams a channel, or stops jamming it.
     pub fn jam(&self, channel: u8, jammed: bool) {
         let mut state = self.0.borrow_mut();
         let now = state.clock.now();
@@ -103,7 +106,7 @@ impl Air {
         }
     }
 
-    /// Sends a packet, whose preamble begins now. Returns how long it is on the air.
+    /// Sends a packet whose preamble begins now. Returns its duration on the air.
     pub fn send(&self, packet: &AirPacket<'_>) -> Duration {
         let mut state = self.0.borrow_mut();
         let now = state.clock.now();
@@ -115,7 +118,7 @@ impl Air {
         span
     }
 
-    /// Another radio, and its number.
+    /// Adds a radio and returns its number.
     pub(super) fn join(&self, radio: Radio) -> usize {
         let mut state = self.0.borrow_mut();
         state.radios.push(radio);
@@ -126,12 +129,12 @@ impl Air {
         self.0.borrow().clock.clone()
     }
 
-    /// Lets everything happen that is due, then something with one radio.
+    /// Processes all due events, then applies `act` to one radio.
     pub(super) fn with<T>(&self, number: usize, now: Instant, act: impl FnOnce(&mut Radio) -> T) -> T {
         let mut state = self.0.borrow_mut();
         state.advance(now);
         let outcome = act(&mut state.radios[number]);
-        // What begins at this instant.
+        // Events that `act` causes at this instant.
         state.advance(now);
         let (radio, channel) = (&state.radios[number], state.radios[number].channel());
         if radio.listens(now) && state.jammed[usize::from(channel)] {
@@ -141,7 +144,8 @@ impl Air {
         outcome
     }
 
-    /// Is the interrupt of this radio asserted? Otherwise, the waker is called when that can have changed.
+    /// State of this radio's interrupt, and the instant of the next event. `waker` is called when
+    /// the state may have changed.
     pub(super) fn interrupts(&self, number: usize, waker: Option<&Waker>) -> (bool, Option<Instant>) {
         let mut state = self.0.borrow_mut();
         let now = state.clock.now();
@@ -153,12 +157,13 @@ impl Air {
     }
 }
 
-/// What happens next.
+/// The next event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Event {
-    /// The end of the transmission of this number. Before what radios do, whose patience may end at the same time.
+    /// End of the transmission with this number. Ordered before actions of radios, whose timeout
+    /// may end at the same instant.
     Arrives(usize),
-    /// This radio does something.
+    /// Action of a radio.
     Acts(usize),
 }
 
@@ -182,18 +187,20 @@ impl State {
                 }
             }
         }
+        // Ended transmissions are kept for a while, because a later one may have overlapped them.
         self.sent.retain(|sent| !sent.delivered || sent.until + LONGEST > now);
     }
 
     fn emit(&mut self, sender: Option<usize>, emission: Emission, from: Instant) -> Duration {
         let span = emission.rate.of(PREAMBLE + emission.bits.len() as u64);
+        // Both are drawn for every packet, so that the sequence does not depend on the loss rate.
         let (lost, place) = (self.noise.chance(self.loss), self.noise.unit());
         let wrong = lost.then_some((place * emission.bits.len() as f64) as usize);
         self.sent.push(Transmission { sender, emission, from, until: from + span, wrong, delivered: false });
         span
     }
 
-    /// A transmission is over: whoever listened to all of it has it.
+    /// End of a transmission: radios that listened from its beginning receive it.
     fn deliver(&mut self, place: usize) {
         let sent = &self.sent[place];
         let Emission { channel, rate, .. } = sent.emission;

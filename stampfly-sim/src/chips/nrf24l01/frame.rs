@@ -1,11 +1,12 @@
-//! A packet as the bits that are on the air: address, control field, payload, CRC (nRF24L01+ product specification, 7.3).
+//! A packet as bits on the air: address, control field, payload, CRC (nRF24L01+ product
+//! specification, 7.3).
 //!
-//! Everybody looks at the same bits, so a receiver of another address width, another payload length or another CRC gets what it would get from a
-//! radio, which is nothing.
+//! All receivers process the same bits, so a receiver with another address width, payload length or
+//! CRC rejects the packet as a real radio does.
 
 use stampfly_types::Duration;
 
-/// How fast bits follow each other.
+/// Data rate on the air.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum AirRate {
@@ -15,7 +16,7 @@ pub enum AirRate {
 }
 
 impl AirRate {
-    /// How long so many bits take.
+    /// Duration of `bits` bits.
     pub(super) const fn of(self, bits: u64) -> Duration {
         Duration::from_micros(match self {
             Self::Kbit250 => 4 * bits,
@@ -25,23 +26,24 @@ impl AirRate {
     }
 }
 
-/// What the bits are made of. Bytes go out most significant bit first, the address most significant byte first (7.3.2).
+/// Content of a packet. Bytes are sent most significant bit first, the address most significant
+/// byte first (7.3.2).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Content<'a> {
-    /// In the order of the register: the first byte is the least significant.
+    /// In the order of the register: least significant byte first.
     pub address: &'a [u8],
-    /// Enhanced ShockBurst's control field, 9 bits (7.3.3); none in ShockBurst (7.10).
+    /// Enhanced ShockBurst's control field, 9 bits (7.3.3); `None` in ShockBurst (7.10).
     pub control: Option<u16>,
     pub payload: &'a [u8],
-    /// 0, 1 or 2.
+    /// Length of the CRC, 0 to 2 bytes.
     pub crc: u8,
 }
 
-/// Bits of the control field.
+/// Length of the control field, bits.
 pub(super) const CONTROL: usize = 9;
 
 impl Content<'_> {
-    /// The bits, without the preamble.
+    /// The bits without the preamble.
     pub fn bits(&self) -> Vec<bool> {
         let mut bits = Vec::new();
         self.address.iter().rev().for_each(|byte| push(&mut bits, u16::from(*byte), 8));
@@ -59,12 +61,12 @@ fn push(bits: &mut Vec<bool>, value: u16, count: usize) {
     bits.extend((0..count).rev().map(|place| value >> place & 1 == 1));
 }
 
-/// The number that these bits are; what is missing is zero.
+/// The number formed by these bits; missing bits are zero.
 pub(super) fn number(bits: &[bool], from: usize, count: usize) -> u16 {
     (from..from + count).fold(0, |number, place| number << 1 | u16::from(bits.get(place).copied().unwrap_or(false)))
 }
 
-/// The CRC over bits (7.3.5): X¹⁶ + X¹² + X⁵ + 1 from FFFF, or X⁸ + X² + X + 1 from FF.
+/// CRC over bits (7.3.5): X¹⁶ + X¹² + X⁵ + 1 from FFFF, or X⁸ + X² + X + 1 from FF.
 pub(super) fn checksum(bits: &[bool], bytes: u8) -> u16 {
     let (polynomial, start, top) = match bytes {
         0 => return 0,
@@ -73,6 +75,7 @@ pub(super) fn checksum(bits: &[bool], bytes: u8) -> u16 {
     };
     let mask = start;
     bits.iter().fold(start, |sum: u16, bit| {
+        // Bit by bit, because with a control field the data are not whole bytes.
         let out = (sum >> top & 1 == 1) ^ *bit;
         (sum << 1 ^ if out { polynomial } else { 0 }) & mask
     })
@@ -87,7 +90,8 @@ mod tests {
         let mut bits = Vec::new();
         b"123456789".iter().for_each(|byte| push(&mut bits, u16::from(*byte), 8));
         assert_eq!(checksum(&bits, 2), 0x29B1);
-        // CRC-8 of the same polynomial and start, catalogued as ROHC only with bits reversed: by hand for one zero byte.
+        // CRC-8 with the same polynomial and start is catalogued (as ROHC) only with reversed bits:
+        // computed by hand for one zero byte.
         assert_eq!(checksum(&[false; 8], 1), 0xF3);
     }
 

@@ -1,5 +1,6 @@
-//! The radio nRF24L01+ and the nRF24L01 before it: Nordic Semiconductor's product specifications, nRF24L01+ v1.0 ("PS" below) and nRF24L01 v2.0,
-//! on SPI, with the [air](Air) between several of them.
+//! Emulator of the radio nRF24L01+ and its predecessor nRF24L01: Nordic Semiconductor's product
+//! specifications, nRF24L01+ v1.0 ("PS" below) and nRF24L01 v2.0, on SPI, with the [radio
+//! channel](Air) between several of them.
 //!
 //! | register | content | after reset | PS |
 //! |---|---|---|---|
@@ -10,31 +11,35 @@
 //! | 0x05, 0x06 | channel; rate (5, 3) and power (2:1) | 0x02, 0x0E | 9.1 |
 //! | 0x07 | STATUS: received (6), sent (5), given up (4), each cleared by a one; pipe (3:1), full (0) | 0x0E | 9.1 |
 //! | 0x09 | a carrier was received | 0 | 6.4 |
-//! | 0x0A–0x0F, 0x10 | addresses of the pipes, and that which is sent to | E7…, C2…, C3 to C6, E7… | 9.1 |
+//! | 0x0A–0x0F, 0x10 | addresses of the pipes, and destination address | E7…, C2…, C3 to C6, E7… | 9.1 |
 //! | 0x11–0x16 | bytes of payloads in each pipe, 0 is none | 0 | 9.1 |
 //! | 0x17 | FIFOs: outgoing full (5), empty (4), received full (1), empty (0) | 0x11 | 9.1 |
-//! | 0x1C, 0x1D | payloads that say their length; features | 0 | 9.1 |
+//! | 0x1C, 0x1D | dynamic payload length; features | 0 | 9.1 |
 //!
 //! | command | | PS table 20 |
 //! |---|---|---|
 //! | 000A AAAA, 001A AAAA | read, write a register, low byte first | writes only in power down and standby |
-//! | 0110 0001 | read a payload, which is gone then | |
+//! | 0110 0001 | read a payload and remove it | |
 //! | 0110 0000 | its length | |
 //! | 1010 0000, 1011 0000 | payload to be sent, without acknowledgement | |
 //! | 1110 0001, 1110 0010 | empty the FIFO of outgoing, of received payloads | |
 //! | 1111 1111 | nothing | |
 //!
-//! The first byte out is STATUS. 100 ms after power-on it answers (6.1.1), 4.5 ms after being powered up it is in standby (6.1.7, with the worst
-//! crystal of its table), 130 µs after CE has risen it listens or sends. What begins before that is not heard. A received packet has to match
-//! channel, rate, address, length and CRC bit for bit; a fourth one, while three wait to be read, is lost (8.4).
+//! The first byte out is STATUS. The chip answers 100 ms after power-on (6.1.1), is in standby 4.5
+//! ms after being powered up (6.1.7, with the slowest crystal of its table), and listens or sends
+//! 130 µs after CE has risen. Packets that begin earlier are not received. A received packet has to
+//! match channel, rate, address, length and CRC bit for bit. A packet that arrives while three are
+//! waiting to be read is lost (8.4).
 //!
-//! [`original`](Nrf24l01::original) is the part without the plus: no 250 kbit/s, bit 0 of 0x06 is its amplifier, and 0x1C and 0x1D are
-//! accessible only after the command 0x50 0x73.
+//! [`original`](Nrf24l01::original) is the nRF24L01 without the plus: no 250 kbit/s, bit 0 of 0x06
+//! is its amplifier, and 0x1C and 0x1D are accessible only after the command 0x50 0x73.
 //!
-//! *Unverified*: what is lost when a register is written while the radio listens or sends: here, the write, but for STATUS and for one that powers
-//! down; that nothing is answered during the power-on reset; that all zeros are read where there is nothing; what a CRC does that is the wrong one
-//! after a right address (here the packet is gone). Table 20 and the registers 0x1C and 0x1D have been compared with the sheet, the other numbers of sections and tables have not.
-//! Not modelled: payloads in acknowledgements, 0x08, the use of a payload again, distances, the strength of signals.
+//! *Unverified*: writes to registers while the radio listens or sends are lost, except for STATUS
+//! and for a write that powers down; no answer during the power-on reset; missing data read as
+//! zeros; a packet with a wrong CRC after a matching address is lost. Table 20 and the registers
+//! 0x1C and 0x1D have been compared with the data sheet, the other section and table numbers have
+//! not. Not modelled: payloads in acknowledgements, 0x08, reuse of a payload, distance, signal
+//! strength.
 
 mod air;
 mod frame;
@@ -57,7 +62,7 @@ const W_TX_PAYLOAD_NOACK: u8 = 0xB0;
 const FLUSH_TX: u8 = 0xE1;
 const FLUSH_RX: u8 = 0xE2;
 const ACTIVATE: u8 = 0x50;
-/// The longest payload, bytes.
+/// Longest payload, bytes.
 const LONGEST: usize = 32;
 
 /// The emulator.
@@ -82,20 +87,20 @@ pub struct Nrf24l01 {
     air: Air,
     number: usize,
     command: u8,
-    /// What came after the command.
+    /// Bytes after the command.
     data: Vec<u8>,
-    /// What is read after it.
+    /// Bytes read after STATUS.
     answer: Vec<u8>,
 }
 
 impl Nrf24l01 {
-    /// An nRF24L01+ that has just been powered, with CE low.
+    /// An nRF24L01+ after power-on, with CE low.
     #[must_use]
     pub fn new(air: &Air) -> Self {
         Self::of(air, true)
     }
 
-    /// An nRF24L01 without the plus.
+    /// An nRF24L01 without the plus, after power-on.
     #[must_use]
     pub fn original(air: &Air) -> Self {
         Self::of(air, false)
@@ -110,7 +115,7 @@ impl Nrf24l01 {
         self.air.with(self.number, now, act)
     }
 
-    /// What follows the status.
+    /// Prepares the bytes that follow STATUS.
     fn prepare(&mut self, now: Instant) {
         let command = self.command;
         self.answer = self.with(now, |radio| match command {
@@ -121,7 +126,7 @@ impl Nrf24l01 {
         });
     }
 
-    /// The chip select has risen.
+    /// Executes the command when the chip select has risen.
     fn execute(&mut self, now: Instant) {
         let (command, data) = (self.command, core::mem::take(&mut self.data));
         self.with(now, |radio| {
@@ -147,7 +152,8 @@ impl Nrf24l01 {
     }
 }
 
-/// A write (table 20): in power down and standby, but for flags and for the end of power.
+/// Writes a register (table 20): only in power down and standby, except for flags and for a power
+/// down.
 fn write(radio: &mut Radio, register: u8, data: &[u8]) {
     let powers_down = register == register::CONFIG && data.first().is_some_and(|config| config & 2 == 0);
     if radio.is_idle() || register == register::STATUS || powers_down {
@@ -160,7 +166,7 @@ fn status(radio: &Radio) -> u8 {
     radio.registers.flags | pipe << 1 | u8::from(radio.outgoing.len() == FIFO)
 }
 
-/// What a register reads.
+/// Content of a register.
 fn value(radio: &Radio, register: u8) -> Vec<u8> {
     let registers = &radio.registers;
     if let Some(address) = registers.long(register) {
@@ -183,7 +189,7 @@ fn value(radio: &Radio, register: u8) -> Vec<u8> {
 }
 
 impl Chip for Nrf24l01 {
-    /// Of an address, the lowest byte.
+    /// Of an address only the least significant byte.
     fn read(&mut self, register: u16, now: Instant) -> u16 {
         self.with(now, |radio| value(radio, register as u8 & 0x1F).first().copied().map_or(0, u16::from))
     }
@@ -199,10 +205,10 @@ impl Chip for Nrf24l01 {
         self.with(now, |radio| radio.reset(now));
     }
 
-    /// It has none.
+    /// Has no effect: the chip has no identity register.
     fn set_id(&mut self, _: u16) {}
 
-    /// Its antenna is off: it hears nothing, and nobody hears it.
+    /// Removes the antenna: the radio neither receives nor is received.
     fn set_broken(&mut self, broken: bool) {
         let now = self.air.clock().now();
         self.with(now, |radio| radio.broken = broken);
@@ -243,7 +249,7 @@ impl SpiChip for Nrf24l01 {
 }
 
 impl SpiPort<Nrf24l01> {
-    /// The chip's CE, low.
+    /// The chip's CE pin, initially low.
     #[must_use]
     pub fn chip_enable(&self) -> ChipEnable {
         let (_, chip) = self.chip();

@@ -1,4 +1,4 @@
-//! The two pins that an nRF24L01 has beside its SPI: CE, and the interrupt.
+//! Pins of an nRF24L01 outside its SPI: CE and the interrupt.
 
 use super::air::Air;
 use core::convert::Infallible;
@@ -8,7 +8,8 @@ use core::task::Poll;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use embedded_hal_async::digital::Wait;
 
-/// CE: high, the radio listens or sends. Comes from [`SpiPort::chip_enable`](crate::chips::SpiPort::chip_enable).
+/// CE: the radio listens or sends while it is high. From
+/// [`SpiPort::chip_enable`](crate::chips::SpiPort::chip_enable).
 #[derive(Clone, Debug)]
 pub struct ChipEnable {
     pub(super) air: Air,
@@ -38,9 +39,10 @@ impl OutputPin for ChipEnable {
     }
 }
 
-/// The interrupt, active low. Comes from [`SpiPort::radio_interrupt`](crate::chips::SpiPort::radio_interrupt).
+/// The interrupt, active low. From
+/// [`SpiPort::radio_interrupt`](crate::chips::SpiPort::radio_interrupt).
 ///
-/// Levels can be waited for; an edge is one between two looks.
+/// Waiting for levels is exact; an edge is detected as a change between two polls.
 #[derive(Clone, Debug)]
 pub struct RadioInterrupt {
     pub(super) air: Air,
@@ -60,7 +62,7 @@ impl RadioInterrupt {
                 return Poll::Ready(());
             }
             if let Some(next) = next {
-                // Leaves the deadline with the clock; it is not over yet.
+                // Polling once registers the deadline with the clock.
                 let _ = Pin::new(&mut clock.sleep_until(next)).poll(context);
             }
             Poll::Pending

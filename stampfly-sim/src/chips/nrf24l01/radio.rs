@@ -1,24 +1,26 @@
-//! What one radio does by itself: power states, settling, sending, listening, acknowledging (nRF24L01+ product specification, 6.1 and 7.4).
+//! State machine of one radio: power, settling, transmission, reception, acknowledgement (nRF24L01+
+//! product specification, 6.1 and 7.4).
 
 use super::frame::{AirRate, CONTROL, Content, checksum, number};
 use super::registers::{Payload, Registers, flag, register};
 use stampfly_types::{Duration, Instant};
 use std::collections::VecDeque;
 
-/// From power-on to power down (6.1.1, figure 4).
+/// Time from power-on to power down (6.1.1, figure 4).
 const POWER_ON: Duration = Duration::from_micros(100_000);
-/// From power down to standby, for a crystal with up to 90 mH (6.1.7, table 16, Tpd2stby): the longest of the table.
+/// Time from power down to standby with a crystal of up to 90 mH, the longest of the table (6.1.7,
+/// table 16, Tpd2stby).
 const POWER_UP: Duration = Duration::from_micros(4_500);
-/// From standby to listening or sending (Tstby2a).
+/// Time from standby to listening or sending (Tstby2a).
 const SETTLE: Duration = Duration::from_micros(130);
-/// The shortest pulse of CE that sends (Thce).
+/// Shortest CE pulse that starts a transmission (Thce).
 const PULSE: Duration = Duration::from_micros(10);
-/// Payloads in each FIFO (8.4).
+/// Depth of each FIFO, payloads (8.4).
 pub(super) const FIFO: usize = 3;
-/// No acknowledgement wanted, in the control field (7.3.3.3).
+/// Bit of the control field: no acknowledgement wanted (7.3.3.3).
 const NO_ACKNOWLEDGEMENT: u16 = 1;
 
-/// Something that goes on the air.
+/// A transmission.
 #[derive(Clone, Debug)]
 pub(super) struct Emission {
     pub channel: u8,
@@ -28,36 +30,36 @@ pub(super) struct Emission {
 
 #[derive(Clone, Debug)]
 enum State {
-    /// Power down or one of the standbys.
+    /// Power down or standby.
     Idle,
-    /// Hears what begins from this instant on.
+    /// Receives packets that begin at or after this instant.
     Listening(Instant),
-    /// Sends the first payload, or the acknowledgement of this pipe, at this instant.
+    /// Will send the first payload, or the acknowledgement of this pipe, at this instant.
     Settling(Instant, Option<u8>),
-    /// Is on the air until then, with the first payload or an acknowledgement.
+    /// Sends the first payload, or an acknowledgement, until this instant.
     Sending(Option<Instant>, Option<u8>),
-    /// Hears an acknowledgement that begins between these.
+    /// Receives an acknowledgement that begins between these instants.
     Awaiting(Instant, Instant),
 }
 
-/// A radio: its registers, its FIFOs, and what it does.
+/// A radio: registers, FIFOs and state.
 #[derive(Debug)]
 pub(super) struct Radio {
     pub registers: Registers,
     pub received: VecDeque<(u8, Vec<u8>)>,
     pub outgoing: VecDeque<Payload>,
-    /// The antenna is off.
+    /// The antenna is removed.
     pub broken: bool,
     ready: Instant,
-    /// Standby can be reached from here on; `None` in power down.
+    /// Instant from which standby is reached; `None` in power down.
     crystal: Option<Instant>,
     enabled: bool,
     raised: Instant,
     state: State,
-    /// Number of the packet that is sent, and attempts that are left.
+    /// Number of the packet in transmission, and attempts left.
     packet: u16,
     attempts: u8,
-    /// Number and sum of the last packet of every pipe.
+    /// Number and checksum of the last packet in each pipe, to detect repetitions.
     heard: [Option<(u16, u16)>; 6],
     carrier: bool,
 }
@@ -83,7 +85,7 @@ impl Radio {
         radio
     }
 
-    /// The supply comes, or comes back.
+    /// Power-on, or return of the supply.
     pub fn reset(&mut self, now: Instant) {
         self.registers = Registers::new(self.registers.is_plus);
         self.received.clear();
@@ -92,12 +94,12 @@ impl Radio {
         (self.heard, self.carrier) = ([None; 6], false);
     }
 
-    /// Is the power-on reset over?
+    /// True when the power-on reset is over.
     pub fn is_up(&self, now: Instant) -> bool {
         now >= self.ready
     }
 
-    /// May the configuration be written (table 20, W_REGISTER)?
+    /// True if the configuration may be written (table 20, W_REGISTER).
     pub const fn is_idle(&self) -> bool {
         matches!(self.state, State::Idle)
     }
@@ -114,7 +116,7 @@ impl Radio {
         }
     }
 
-    /// Does it hear what begins at this instant?
+    /// True if it receives a packet that begins at this instant.
     pub fn listens(&self, at: Instant) -> bool {
         match self.state {
             State::Listening(from) => at >= from,
@@ -131,12 +133,13 @@ impl Radio {
         self.carrier
     }
 
-    /// Is the interrupt pin pulled (8.5)? A flag in STATUS is masked by the bit of the same place in CONFIG.
+    /// True if the interrupt pin is asserted (8.5). A flag in STATUS is masked by the bit at the
+    /// same position in CONFIG.
     pub fn interrupts(&self) -> bool {
         self.registers.flags & !self.registers.get(register::CONFIG) & flag::ALL != 0
     }
 
-    /// CE changes.
+    /// Changes CE.
     pub fn enable(&mut self, enabled: bool, now: Instant) {
         if enabled && !self.enabled {
             self.raised = now;
@@ -145,7 +148,7 @@ impl Radio {
         self.settle(now);
     }
 
-    /// Settings or payloads may have changed: goes where the pins and bits want it.
+    /// Updates the state after a change of settings, payloads or pins.
     pub fn settle(&mut self, now: Instant) {
         let powered = self.registers.get(register::CONFIG) & 2 != 0;
         if !powered {
@@ -173,7 +176,7 @@ impl Radio {
         }
     }
 
-    /// When it does something by itself.
+    /// Instant of the next autonomous action.
     pub fn next_event(&self) -> Option<Instant> {
         match self.state {
             State::Idle => self.crystal.filter(|_| self.enabled && self.is_waiting_for_crystal()),
@@ -184,13 +187,13 @@ impl Radio {
         }
     }
 
-    /// Has nobody settled it since its crystal runs?
+    /// True if an action is waiting for the crystal to start.
     fn is_waiting_for_crystal(&self) -> bool {
         let receives = self.registers.get(register::CONFIG) & 1 != 0;
         receives || !self.outgoing.is_empty() && self.registers.flags & flag::MAX_RT == 0
     }
 
-    /// Does it. Gives what goes on the air.
+    /// Performs the due action. Returns a transmission that begins.
     pub fn act(&mut self, at: Instant) -> Option<Emission> {
         match self.state {
             State::Settling(_, pipe) => self.begin(pipe, at),
@@ -226,7 +229,7 @@ impl Radio {
         }
     }
 
-    /// Goes on the air with the first payload, unless somebody has taken it away, or with an acknowledgement.
+    /// Begins to send the first payload, unless it has been removed, or an acknowledgement.
     fn begin(&mut self, pipe: Option<u8>, at: Instant) -> Option<Emission> {
         let emission = self.emission(pipe);
         self.state = if emission.is_some() { State::Sending(None, pipe) } else { State::Idle };
@@ -234,26 +237,26 @@ impl Radio {
         emission
     }
 
-    /// What was given goes on until then.
+    /// Sets the end of the transmission that has begun.
     pub fn send_until(&mut self, until: Instant) {
         if let State::Sending(end, _) = &mut self.state {
             *end = Some(until);
         }
     }
 
-    /// The first payload has been sent, and acknowledged if that was wanted.
+    /// The first payload has been sent and, if required, acknowledged.
     fn sent(&mut self, at: Instant) {
         self.outgoing.pop_front();
         self.registers.flags |= flag::TX_DS;
         self.state = State::Idle;
         self.settle(at);
-        // Between two payloads it does not leave the transmit mode (6.1.5).
+        // The radio stays in transmit mode between two payloads (6.1.5), so it need not settle.
         if let State::Settling(begins, None) = &mut self.state {
             *begins = at;
         }
     }
 
-    /// Enhanced ShockBurst is off when no pipe acknowledges and nothing is sent again (7.10).
+    /// Enhanced ShockBurst is off when no pipe acknowledges and retransmission is off (7.10).
     fn is_enhanced(&self) -> bool {
         self.registers.get(register::EN_AA) != 0 || self.registers.get(register::SETUP_RETR) & 0x0F != 0
     }
@@ -277,14 +280,14 @@ impl Radio {
         Some(Emission { channel: self.channel(), rate: self.rate(), bits })
     }
 
-    /// Bytes of the CRC. It cannot be switched off while a pipe acknowledges (9.1, CONFIG).
+    /// Length of the CRC, bytes. It cannot be switched off while a pipe acknowledges (9.1, CONFIG).
     fn crc(&self) -> u8 {
         let config = self.registers.get(register::CONFIG);
         let on = config & 8 != 0 || self.registers.get(register::EN_AA) != 0;
         u8::from(on) + u8::from(on && config & 4 != 0)
     }
 
-    /// A packet on its channel, of which it has heard every bit, is over.
+    /// Receives a complete packet on its channel.
     pub fn hear(&mut self, bits: &[bool], at: Instant) {
         if self.broken {
             return;
@@ -303,7 +306,7 @@ impl Radio {
         let (end, crc) = (body + 8 * length, self.crc());
         let Some(covered) = bits.get(..end) else { return };
         let sum = checksum(covered, crc);
-        // What follows a packet that is too short is noise, which is not the sum.
+        // After a packet that is too short, noise follows instead of the checksum.
         if bits.len() < end + 8 * usize::from(crc) || sum != number(bits, end, 8 * usize::from(crc)) || length > 32 {
             return;
         }
@@ -312,9 +315,11 @@ impl Radio {
             return;
         }
         let acknowledges = enhanced && self.registers.get(register::EN_AA) >> pipe & 1 != 0;
+        // A repetition has the same packet number and checksum.
         let seen = (control >> 1 & 3, sum);
         let again = acknowledges && self.heard[usize::from(pipe)] == Some(seen);
         if !again {
+            // No acknowledgement either: the sender repeats the packet.
             if self.received.len() == FIFO {
                 return;
             }
@@ -324,12 +329,13 @@ impl Radio {
             self.heard[usize::from(pipe)] = Some(seen);
         }
         if acknowledges && control & NO_ACKNOWLEDGEMENT == 0 {
+            // The acknowledgement carries the number of the packet.
             self.packet = control >> 1 & 3;
             self.state = State::Settling(at + SETTLE, Some(pipe));
         }
     }
 
-    /// The first enabled pipe whose address this is, and the bits of that.
+    /// The first enabled pipe with this address, and the length of the address in bits.
     fn pipe(&self, bits: &[bool]) -> Option<(u8, usize)> {
         let enabled = self.registers.get(register::EN_RXADDR);
         (0..6).filter(|pipe| enabled >> pipe & 1 != 0).find_map(|pipe| {

@@ -1,4 +1,4 @@
-//! The registers of an nRF24L01 (product specification, 9.1, table 28), and what is in its FIFOs.
+//! Registers of an nRF24L01 (product specification, 9.1, table 28), and payloads in its FIFOs.
 
 /// Register addresses.
 pub(super) mod register {
@@ -20,7 +20,7 @@ pub(super) mod register {
     pub const FEATURE: u8 = 0x1D;
 }
 
-/// Flags of STATUS, which are masks in CONFIG.
+/// Flags of STATUS, and their masks in CONFIG.
 pub(super) mod flag {
     pub const RX_DR: u8 = 0x40;
     pub const TX_DS: u8 = 0x20;
@@ -28,7 +28,7 @@ pub(super) mod flag {
     pub const ALL: u8 = 0x70;
 }
 
-/// Values after reset, from CONFIG on; the addresses and those that cannot be written are elsewhere.
+/// Values after reset from CONFIG on, without addresses and read-only registers.
 const AFTER_RESET: [(u8, u8); 7] = [
     (register::CONFIG, 0x08),
     (register::EN_AA, 0x3F),
@@ -39,7 +39,7 @@ const AFTER_RESET: [(u8, u8); 7] = [
     (register::RF_SETUP, 0x0E),
 ];
 
-/// A payload that is to be sent.
+/// A payload to send.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Payload {
     pub bytes: Vec<u8>,
@@ -51,12 +51,12 @@ pub(super) struct Registers {
     pub is_plus: bool,
     /// Flags of STATUS.
     pub flags: u8,
-    /// What the original part's ACTIVATE has made accessible.
+    /// Features are accessible; on the original part after ACTIVATE.
     pub activated: bool,
     bytes: [u8; 32],
-    /// Of pipes 0 and 1, and the one that is sent to.
+    /// Addresses of pipes 0 and 1, and the destination address.
     long: [[u8; 5]; 3],
-    /// Lowest bytes of pipes 2 to 5.
+    /// Least significant address bytes of pipes 2 to 5.
     short: [u8; 4],
 }
 
@@ -67,7 +67,8 @@ impl Registers {
             bytes[usize::from(register)] = value;
         }
         if !is_plus {
-            // With the gain of its low-noise amplifier (nRF24L01 product specification 2.0, 9.1).
+            // Bit 0 is the gain of its low-noise amplifier (nRF24L01 product specification 2.0,
+            // 9.1).
             bytes[usize::from(register::RF_SETUP)] = 0x0F;
         }
         Self {
@@ -80,12 +81,12 @@ impl Registers {
         }
     }
 
-    /// A register of one byte that can be written.
+    /// Content of a writable one-byte register.
     pub fn get(&self, register: u8) -> u8 {
         self.bytes[usize::from(register & 0x1F)]
     }
 
-    /// Writes a register from its lowest byte on (8.3.1).
+    /// Writes a register, least significant byte first (8.3.1).
     pub fn write(&mut self, register: u8, data: &[u8]) {
         let Some(first) = data.first() else { return };
         match register {
@@ -99,7 +100,7 @@ impl Registers {
         }
     }
 
-    /// Bits that keep what is written; those that are not defined read as zero (9.1).
+    /// Writable bits; undefined bits read as zero (9.1).
     const fn writable(&self, register: u8) -> u8 {
         match register {
             register::CONFIG | register::RF_CH => 0x7F,
@@ -114,7 +115,7 @@ impl Registers {
         }
     }
 
-    /// A register of five bytes, if it is one.
+    /// Content of a five-byte register; `None` for others.
     pub fn long(&self, register: u8) -> Option<[u8; 5]> {
         match register {
             0x0A | 0x0B => Some(self.long[usize::from(register - 0x0A)]),
@@ -123,12 +124,12 @@ impl Registers {
         }
     }
 
-    /// A register of one byte that is the lowest of an address.
+    /// Content of a register with the least significant byte of an address; `None` for others.
     pub fn short(&self, register: u8) -> Option<u8> {
         matches!(register, 0x0C..=register::RX_ADDR_P5).then(|| self.short[usize::from(register - 0x0C)])
     }
 
-    /// Bytes of an address; none where the setting is illegal.
+    /// Length of addresses, bytes; 0 for an illegal setting.
     fn width(&self) -> usize {
         match self.get(register::SETUP_AW) {
             0 => 0,
@@ -136,12 +137,12 @@ impl Registers {
         }
     }
 
-    /// The address that is sent to.
+    /// The destination address.
     pub fn sends_to(&self) -> Vec<u8> {
         self.long[2][..self.width()].to_vec()
     }
 
-    /// The address of a pipe. Those of pipes 2 to 5 share all but the lowest byte with pipe 1 (7.7).
+    /// Address of a pipe. Pipes 2 to 5 share all but the least significant byte with pipe 1 (7.7).
     pub fn address(&self, pipe: u8) -> Vec<u8> {
         let mut address = if pipe == 0 { self.long[0] } else { self.long[1] };
         if let Some(lowest) = usize::from(pipe).checked_sub(2).and_then(|place| self.short.get(place)) {
@@ -150,7 +151,7 @@ impl Registers {
         address[..self.width()].to_vec()
     }
 
-    /// Bytes of a payload in this pipe; `None` where packets say it themselves (7.3.4).
+    /// Payload length of this pipe, bytes; `None` for dynamic length (7.3.4).
     pub fn payload_width(&self, pipe: u8) -> Option<u8> {
         let says = self.get(register::FEATURE) & 4 != 0 && self.get(register::DYNPD) >> pipe & 1 != 0;
         (!says).then(|| self.get(register::RX_PW_P0 + pipe))

@@ -1,37 +1,38 @@
-//! A logic analyser on an SPI bus: every transfer with its bytes and instants, and when a waited-for interrupt pin was seen high.
+//! Logic analyser of an SPI bus: records every transfer with its bytes and instants, and when a
+//! task saw the interrupt pin high.
 //!
-//! Use it to look at what a driver really says to its chip, or to replay one end of the bus without the other: with these entries a
-//! driver does the same again on a machine that has no chips. What it writes down grows with the flight, 100 kB a second. Not for
-//! counting edges: [`SpiPort::rising_edges`](super::SpiPort::rising_edges) does.
-
+//! Use it to inspect the traffic between driver and chip, or to replay it: given these entries a
+//! driver behaves the same on a machine without the chips. The record grows by about 100 kB per
+//! simulated second. To count clock edges only use
+//! [`SpiPort::rising_edges`](super::SpiPort::rising_edges).
 use stampfly_types::Instant;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// What an analyser has seen.
+/// An entry of the analyser's record.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Seen {
     /// A transfer.
     Transfer {
-        /// Which chip: its number on the bus, in the order in which they were soldered.
+        /// Number of the chip on the bus, in the order of attachment.
         chip: usize,
-        /// When the select fell, and when the software had what was read.
+        /// Instant at which the chip select fell.
         begun: Instant,
-        /// See there.
+        /// Instant at which the software had the data.
         ended: Instant,
-        /// Did the processor do all of it itself, so that no other task ran meanwhile?
+        /// True if the processor did not yield, so that no other task ran meanwhile.
         blocked: bool,
-        /// What the driver wrote, without what it sent to read or in place of what it read.
+        /// Bytes written by the driver, without the padding sent while reading.
         wrote: Vec<u8>,
-        /// What it read.
+        /// Bytes read.
         read: Vec<u8>,
     },
-    /// A task that waited for the interrupt pin saw it high.
+    /// A task waiting for the interrupt pin saw it high.
     PinHigh(Instant),
 }
 
-/// What is written down, shared with the bus.
+/// The record, shared with the bus.
 #[derive(Clone, Debug, Default)]
 pub struct Analyser(Rc<RefCell<Vec<Seen>>>);
 
@@ -40,7 +41,7 @@ impl Analyser {
         self.0.borrow_mut().push(seen);
     }
 
-    /// Everything so far, in the order in which it ended. It is forgotten here.
+    /// Takes all entries so far, in the order of their ends.
     #[must_use]
     pub fn take(&self) -> Vec<Seen> {
         self.0.take()

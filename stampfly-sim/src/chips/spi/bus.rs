@@ -1,5 +1,5 @@
-//! The wires of an SPI bus and the processor's end of them: controller, levels, software, and what may go wrong for all chips
-//! alike. A chip's place on it is [`SpiPort`](super::SpiPort).
+//! Wires and controller of an SPI bus: levels, software latency, and faults common to all chips. A
+//! chip's place on the bus is a [`SpiPort`](super::SpiPort).
 
 use super::analyser::{Analyser, Seen};
 use super::wire::{BitOrder, Controller, Levels};
@@ -11,28 +11,28 @@ use embedded_hal::spi::Mode;
 use stampfly_types::Instant;
 use std::rc::Rc;
 
-/// Stream of the bit errors; no sensor has this number.
+/// Random stream of bit errors; no sensor uses this number.
 const STREAM: u64 = 102;
 
 pub(super) struct State {
     pub clock: Clock,
     pub busy_until: Cell<Instant>,
     pub noise: RefCell<Noise>,
-    /// How many chip selects nobody drives.
+    /// Number of chip selects that are not driven.
     pub floating: Cell<u32>,
-    /// The byte that every transfer reads, when the line from the chips is stuck.
+    /// The byte read in every transfer while the line from the chips is stuck.
     pub stuck: Cell<Option<u8>>,
     pub controller: Cell<Controller>,
     pub levels: Cell<Levels>,
-    /// No transfer moves whole bytes.
+    /// Simulate every edge, never whole bytes.
     pub edge_by_edge: Cell<bool>,
     pub latency: Cell<Latency>,
-    /// Chips soldered so far.
+    /// Number of chips attached so far.
     pub chips: Cell<usize>,
     pub analyser: RefCell<Option<Analyser>>,
 }
 
-/// The wires that all chips share.
+/// The wires shared by all chips. A handle: clones are the same bus.
 #[derive(Clone)]
 pub struct SpiBus(pub(super) Rc<State>);
 
@@ -43,8 +43,8 @@ impl core::fmt::Debug for SpiBus {
 }
 
 impl SpiBus {
-    /// A bus without chips, whose controller sets the clock's level first. The clock is low until the first transfer. The seed decides
-    /// on bit errors and refusals.
+    /// A bus without chips, whose controller sets the clock's idle level before selecting a chip.
+    /// The clock is low until the first transfer. `seed` draws bit errors and refusals.
     #[must_use]
     pub fn new(clock: &Clock, seed: u64) -> Self {
         let noise = RefCell::new(Noise::new(seed, STREAM));
@@ -63,41 +63,43 @@ impl SpiBus {
         }))
     }
 
-    /// From now on the processor's controller is such a one.
+    /// Sets the behaviour of the processor's controller.
     pub fn set_controller(&self, controller: Controller) {
         self.0.controller.set(controller);
     }
 
-    /// From now on the software takes so long.
+    /// Sets the software latency.
     pub fn set_latency(&self, latency: Latency) {
         self.0.latency.set(latency);
     }
 
-    /// From now on an analyser writes down what goes over the bus.
+    /// Starts an analyser, or returns the running one.
     #[must_use]
     pub fn analyse(&self) -> Analyser {
         self.0.analyser.borrow_mut().get_or_insert_default().clone()
     }
 
-    /// Shows something to the analyser, if there is one.
+    /// Passes an entry to the analyser, if any.
     pub(in crate::chips) fn note(&self, seen: Seen) {
         if let Some(analyser) = &*self.0.analyser.borrow() {
             analyser.note(seen);
         }
     }
 
-    /// Sends a zero in this mode while no chip is selected. Afterwards the clock idles at the level of that mode, whatever the controller.
+    /// Sends a zero byte in this mode without a selected chip. Afterwards the clock idles at the
+    /// level of that mode, with any controller.
     pub fn send_to_nobody(&self, mode: Mode) {
         self.0.levels.set(Levels::after(mode, BitOrder::MostFirst, 0));
     }
 
-    /// From now on no transfer moves whole bytes. It takes longer and changes nothing, which is what it is for: to see that
-    /// both ways are the same.
+    /// Simulates every edge from now on instead of whole bytes. This is slower and gives the same
+    /// results; it serves to verify that.
     pub fn go_edge_by_edge(&self) {
         self.0.edge_by_edge.set(true);
     }
 
-    /// The line from the chips is stuck: high, low, or free again with `None`. What is sent still arrives.
+    /// Makes the line from the chips stick high or low, or releases it with `None`. Sent bytes
+    /// still arrive.
     pub fn hold_miso(&self, level: Option<bool>) {
         self.0.stuck.set(level.map(|high| if high { 0xFF } else { 0 }));
     }

@@ -1,10 +1,11 @@
-//! An SPI bus on virtual time: one [`SpiPort`] per chip select, each with its own clock rate.
+//! SPI bus on virtual time: one [`SpiPort`] per chip select, each with its own clock rate.
 //!
-//! Time works as on [`I2cBus`](super::I2cBus): a transfer costs its bits and its delays, and no other chip gets the
-//! bus meanwhile. What software takes for it is [`Latency`], which is zero unless somebody asks.
+//! Timing is as on [`I2cBus`](super::I2cBus): a transfer occupies the bus for its bits and delays.
+//! Software latency is set by [`Latency`](super::Latency) and zero by default.
 //!
-//! Each port has its mode and its order of bits, and the bus its [`Controller`]. While they agree with the chip, whole bytes are moved;
-//! otherwise the [wire] goes from edge to edge, and a chip gets the bytes that its edges make.
+//! Each port has its clock mode and bit order, and the bus its [`Controller`]. If they match the
+//! chip, whole bytes are moved; otherwise the [wire] is simulated edge by edge, and the chip
+//! receives the bytes that result from its edges.
 
 mod analyser;
 mod bus;

@@ -1,4 +1,4 @@
-//! One chip on an SPI bus: what a transfer of its driver costs, and what goes through it.
+//! One chip on an SPI bus: timing and data of its driver's transfers.
 
 use super::analyser::Seen;
 use super::bus::SpiBus;
@@ -11,54 +11,57 @@ use embedded_hal::spi::{ErrorType, MODE_3, Mode, Operation};
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// Share of the bits that a chip with a floating select spoils by answering into the same line: its select is taken for
-/// low some of the time, and half of its bits are wrong. *Unverified*: a floating line may do anything.
+/// Probability that a chip with a floating select corrupts a bit on the shared line: the select
+/// reads low part of the time, and half of the chip's bits are wrong. *Unverified*: the behaviour
+/// of a floating line is undefined.
 const DISTURBANCE: f64 = 0.05;
-/// Share of the bits that are wrong on a clock faster than the chip allows. *Unverified*: some chips take a little more.
+/// Probability of a wrong bit on a clock faster than the chip allows. *Unverified*: some chips
+/// tolerate slightly more.
 const TOO_FAST: f64 = 0.05;
-/// One chip's place on the bus. Implements the `SpiDevice` traits of embedded-hal, `async` and blocking.
+/// A chip on the bus. Implements the `SpiDevice` traits of embedded-hal, `async` and blocking.
 pub struct SpiPort<C> {
     bus: SpiBus,
-    /// On the bus, in the order of soldering.
+    /// Number on the bus, in the order of attachment.
     number: usize,
     chip: Rc<RefCell<C>>,
     attached: Attached,
-    /// Nanoseconds per byte.
+    /// Time of a byte, ns.
     byte: u64,
-    /// Share of the bits that this clock spoils.
+    /// Probability of a wrong bit on this clock.
     garbled: f64,
     mode: Mode,
     order: BitOrder,
-    /// Rising edges of the clock while the chip was selected.
+    /// Rising clock edges while the chip was selected.
     rising: Cell<u64>,
-    /// Nobody has driven the chip select yet.
+    /// The chip select is not driven yet.
     floating: Cell<bool>,
 }
 
-/// A transfer that has begun.
+/// A transfer in progress.
 struct Transfer {
     start: Instant,
     end: Instant,
-    /// What is already known to fail.
+    /// Result as far as known at the start.
     outcome: Result<(), BusError>,
-    /// The lines as the chip select falls.
+    /// Levels of the lines when the chip select falls.
     levels: Levels,
     latency: Latency,
-    /// The processor does all of it itself, so that its task does not give way.
+    /// The processor performs all of it without yielding.
     blocks: bool,
 }
 
 impl SpiBus {
-    /// Solders a chip to the bus and to a chip select of its own, which is driven high. `frequency` is the clock for
-    /// this chip, Hz; above the [highest](SpiChip::HIGHEST_CLOCK) that it allows its transfers are garbled. The mode is 3, see
-    /// [`SpiPort::with_mode`].
+    /// Attaches a chip with its own chip select, which is driven high. `frequency` is the clock for
+    /// this chip, Hz; above its [highest](SpiChip::HIGHEST_CLOCK) clock, transfers are corrupted.
+    /// The mode is 3, see [`SpiPort::with_mode`].
     pub fn attach<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
         self.solder(frequency, chip, false)
     }
 
-    /// The same with a chip select that floats: as long as nobody drives it, by [`SpiPort::park`] or a first transfer,
-    /// the chip disturbs what the others answer. So does a flow sensor of the StampFly that is not looked after before
-    /// the inertial sensor is asked.
+    /// As [`attach`](Self::attach), with a floating chip select: until it is driven, by
+    /// [`SpiPort::park`] or a first transfer, the chip disturbs the answers of the others. On the
+    /// StampFly the flow sensor does so if the inertial sensor is read before the flow sensor's
+    /// select is initialised.
     pub fn attach_floating<C: SpiChip + 'static>(&self, frequency: u32, chip: C) -> (SpiPort<C>, Attached) {
         self.solder(frequency, chip, true)
     }
@@ -85,7 +88,7 @@ impl SpiBus {
     }
 }
 
-/// Nanoseconds.
+/// Time of a byte, ns.
 fn byte_time(frequency: u32) -> u64 {
     8_000_000_000 / u64::from(frequency.max(1))
 }
@@ -101,51 +104,52 @@ impl<C: SpiChip> core::fmt::Debug for SpiPort<C> {
 }
 
 impl<C> SpiPort<C> {
-    /// In this mode.
+    /// Sets the clock mode.
     #[must_use]
     pub const fn with_mode(mut self, mode: Mode) -> Self {
         self.mode = mode;
         self
     }
 
-    /// With the bits of a byte in this order.
+    /// Sets the bit order.
     #[must_use]
     pub const fn with_order(mut self, order: BitOrder) -> Self {
         self.order = order;
         self
     }
 
-    /// How many rising edges of the clock the chip has seen while it was selected: eight a byte, unless polarity changed under it.
+    /// Number of rising clock edges while the chip was selected: eight per byte, unless the idle
+    /// level changed under it.
     #[must_use]
     pub fn rising_edges(&self) -> u64 {
         self.rising.get()
     }
 
-    /// Drives the chip select, high until the next transfer.
+    /// Drives the chip select high until the next transfer.
     pub fn park(&self) {
         let others = self.bus.0.floating.get() - u32::from(self.floating.take());
         self.bus.0.floating.set(others);
     }
 
-    /// The wires that it shares with others.
+    /// The bus.
     #[must_use]
     pub fn bus(&self) -> SpiBus {
         self.bus.clone()
     }
 
-    /// The clock of the bus and the chip, for pins that the chip has beside it.
+    /// The bus's clock and the chip, for pins of the chip outside the bus.
     pub(in crate::chips) fn chip(&self) -> (Clock, Rc<RefCell<C>>) {
         (self.bus.0.clock.clone(), self.chip.clone())
     }
 }
 
 impl<C: SpiChip> SpiPort<C> {
-    /// Another clock from the next transfer on, Hz: for chips with two.
+    /// Changes the clock from the next transfer on, Hz, for chips with two clock limits.
     pub fn set_frequency(&mut self, frequency: u32) {
         (self.byte, self.garbled) = (byte_time(frequency), garbled::<C>(frequency));
     }
 
-    /// Takes the bus.
+    /// Occupies the bus.
     fn begin(&self, operations: &[Operation<'_, u8>]) -> Transfer {
         self.park();
         let state = &self.bus.0;
@@ -157,6 +161,7 @@ impl<C: SpiChip> SpiPort<C> {
             latency = latency.drawn(state.noise.borrow_mut().unit());
         }
         let mut levels = state.levels.get();
+        // Such a controller corrects the idle level before it selects the chip.
         if state.controller.get() == Controller::LevelFirst {
             levels.clock = wire::idles_high(self.mode);
         }
@@ -180,6 +185,7 @@ impl<C: SpiChip> SpiPort<C> {
                 }
             }
         }
+        // MOSI keeps the level of the last bit sent.
         state.levels.set(sent_last.map_or(levels, |last| Levels::after(self.mode, self.order, last)));
         let end = start + late + Duration::from_micros(nanoseconds.div_ceil(1_000));
         state.busy_until.set(end);
@@ -187,7 +193,7 @@ impl<C: SpiChip> SpiPort<C> {
         Transfer { start, end, outcome, levels, latency, blocks }
     }
 
-    /// Exchanges the bytes of a transfer that is over.
+    /// Exchanges the bytes of a completed transfer.
     fn exchange(&self, operations: &mut [Operation<'_, u8>], transfer: &Transfer) {
         let Transfer { start, end, levels, .. } = *transfer;
         let faults = self.attached.faults();
@@ -221,7 +227,7 @@ impl<C: SpiChip> SpiPort<C> {
         chip.release(end);
     }
 
-    /// Shows a transfer that is over to the analyser.
+    /// Passes a completed transfer to the analyser.
     fn show(&self, operations: &[Operation<'_, u8>], transfer: &Transfer) {
         if self.bus.0.analyser.borrow().is_none() {
             return;
@@ -243,8 +249,8 @@ impl<C: SpiChip> SpiPort<C> {
         self.bus.note(Seen::Transfer { chip: self.number, begun, ended, blocked, wrote, read });
     }
 
-    /// Calls `byte` for every byte of a transfer, with its number, what is sent, and at how many nanoseconds after the start it begins. What
-    /// that gives is read.
+    /// Calls `byte` for each byte of a transfer with its number, the byte sent, and its begin in ns
+    /// after the start. The result is the byte read.
     fn each(
         &self,
         operations: &mut [Operation<'_, u8>],
@@ -287,7 +293,7 @@ impl<C: SpiChip> SpiPort<C> {
     }
 }
 
-/// How many bytes an operation moves, and which it sends last. A read sends zeros.
+/// Number of bytes that an operation moves, and the last byte that it sends. A read sends zeros.
 fn sent(operation: &Operation<'_, u8>) -> (usize, u8) {
     match operation {
         Operation::Read(bytes) => (bytes.len(), 0),

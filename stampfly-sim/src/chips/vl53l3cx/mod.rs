@@ -1,12 +1,14 @@
-//! The range finder VL53L3CX: ST DS13204 ("DS" below), ranging on one target by itself, or giving histograms.
+//! Emulator of the range finder VL53L3CX: ST DS13204 ("DS" below), with ranging on one target, or
+//! histograms.
 //!
-//! ST publishes no register map of this part, only its drivers; the map here is the one of the VL53L1 family as public
-//! drivers and application notes name it (ST UM2510, UM2356), and *all of it is unverified* on this part, but for what
-//! a running StampFly showed: model 0xEA, module type 0xAA and a one in bit 0 of 0x0010 after its start.
+//! ST publishes only drivers of this part, no register map. The map here is that of the VL53L1
+//! family, as named by public drivers and application notes (ST UM2510, UM2356), and *all of it is
+//! unverified* on this part, except for observations on a running StampFly: model 0xEA, module type
+//! 0xAA and a one in bit 0 of 0x0010 after its start.
 //!
 //! | register | content | after reset |
 //! |---|---|---|
-//! | 0x0000 | 0 holds the chip still, 1 then starts it anew at 0x29, as ST's drivers of the VL53L1 do | 1 |
+//! | 0x0000 | 0 holds the chip in reset, 1 then restarts it at 0x29, as ST's drivers of the VL53L1 do | 1 |
 //! | 0x0001 | address, 7 bits; acts from the end of the transfer | 0x29 |
 //! | 0x0006 | fast oscillator as the factory measured it, 4.12 MHz | the specimen's |
 //! | 0x0010, 0x00E5 | bit 0: the firmware runs | 1, 3 |
@@ -42,24 +44,31 @@
 //! | 0x013E, 0x013F | centre and size of the inner detectors | 0xC7, 0x33 |
 //! | 0x0470–0x04B5 | patch of the firmware; kept, without effect | 0 |
 //!
-//! Addresses have two bytes, numbers of more than one byte begin with the highest (DS 3.2). Both directions go on to
-//! the next register. 1.2 ms from the release of XSHUT or from power to the first answer (DS 2.8); until then nobody
-//! acknowledges. A measurement takes the two time-outs and 14 ms more, *unverified*; the next one does not begin before
-//! the interrupt of the one before has been cleared, and not before the period is over. What is set during a
-//! measurement acts on the next one. XSHUT must not rise while a transfer is on the bus (DS, "Power sequence"); a chip whose XSHUT does stays
-//! mute until the next time, *unverified*. The chip has no other memory than these registers: an edge of XSHUT or a dip of
-//! the supply brings it back to 0x29. A dead detector is one for which no bias voltage is found, so it counts nothing.
+//! Register addresses have two bytes, and values of several bytes begin with the most significant
+//! (DS 3.2). Reads and writes continue with the next register. The first answer comes 1.2 ms after
+//! the release of XSHUT or after power-on (DS 2.8); until then the chip does not acknowledge. A
+//! measurement takes the two timeouts plus 14 ms, *unverified*. The next one does not begin before
+//! the interrupt of the previous one has been cleared and its period is over. Settings changed
+//! during a measurement act on the next one. XSHUT must not rise during a transfer on the bus (DS,
+//! "Power sequence"); otherwise the chip stays mute until XSHUT's next edge, *unverified*. All
+//! state is in these registers: an edge of XSHUT or a dip of the supply returns the chip to 0x29. A
+//! broken detector is one for which no bias voltage is found, so it counts nothing.
 //!
-//! A specimen measures too short by what is in 0x0022, unless that is in 0x001E, where ST's core puts it when no measurement of the
-//! mode is corrected (`vl53lx_api_core.c`), and public drivers of the VL53L1X do. That core takes what is in 0x001E after a start for what is
-//! missing from histograms (`VL53LX_get_customer_nvm_managed`), so it is there. *Unverified*: how much it is, some millimetres here.
+//! A specimen measures too short by the value in 0x0022, unless that value is in 0x001E, where ST's
+//! core puts it when no measurement of the mode is corrected (`vl53lx_api_core.c`), and public
+//! drivers of the VL53L1X do, too. The core takes the content of 0x001E after a start as the offset
+//! of histograms (`VL53LX_get_customer_nvm_managed`), so it is stored there. *Unverified*: its
+//! size, here some millimetres.
 //!
-//! A histogram is measured once for each 0x26, as ST's driver drives it (VL53LX bare driver, BSD-3-Clause; its core runs over this emulator):
-//! the settings are sent anew each time, and what acts is what was sent before the last start. The first one after a stop says 18 and is number
-//! 0, as is the next; they go from 255 to 128. Even ones have the laser period and time-out A, odd ones B. It takes six time-outs and 1.7 ms,
-//! as that driver reckons. What is counted is in `photons.rs`.
+//! One histogram is measured for each 0x26, as ST's driver does (VL53LX bare driver, BSD-3-Clause;
+//! its core runs on this emulator). The settings are sent for each histogram; those sent before the
+//! previous start are in effect. The first histogram after a stop has status 18 and number 0, and
+//! the next one has number 0 as well; after 255 numbers continue with 128. Even histograms use
+//! laser period and timeout A, odd ones B. A histogram takes six timeouts and 1.7 ms, by that
+//! driver's calculation. The counts are computed in `photons.rs`.
 //!
-//! Not modelled: which of several targets, thresholds, groups of bins for bright light, other calibration data, the region of interest.
+//! Not modelled: selection among several targets, thresholds, groups of bins for bright light,
+//! other calibration data, the region of interest.
 
 mod photons;
 
@@ -110,45 +119,46 @@ const MODE: u16 = 0x0087;
 const RESULT: u16 = 0x0088;
 const OSCILLATOR: u16 = 0x00DE;
 const MODEL: u16 = 0x010F;
-/// Status of a measurement without a bias voltage for the detector.
+/// Status of a measurement without bias voltage for the detector.
 const NO_BIAS: u8 = 3;
-/// The first histogram after a stop.
+/// Status of the first histogram after a stop.
 const FIRST_OF_GROUP: u8 = 18;
-/// What a histogram needs: its bit in [`MODE`].
+/// Bit of [`MODE`] that selects histograms.
 const HISTOGRAM: u8 = 0x02;
-/// Everything a driver may write lies below.
+/// Size of the register space that a driver may write.
 const SIZE: usize = 0x04B6;
 
 const FIRST_ADDRESS: u8 = 0x29;
 const BOOT: Duration = Duration::from_micros(1_200);
-/// Stream of the specimens' offsets; no sensor has this number. Their standard deviation, mm.
+/// Random stream of the specimens' offsets, not used by any sensor, and the standard deviation of
+/// the offsets, mm.
 const STREAM: u64 = 104;
 const OFFSETS: f64 = 8.0;
-/// Stream of the specimens' photons, by mount.
+/// Random stream of the specimens' photons, plus the mount.
 const PHOTONS: u64 = 106;
-/// Nominal fast oscillator, MHz, and how often a pixel clock comes in it.
+/// Nominal frequency of the fast oscillator, MHz, and pixel clocks per period of it.
 const FAST: f64 = 11.8;
 const CLOCKS: f64 = 64.0;
-/// When a chip answers that came out of its reset in the middle of a transfer.
+/// Ready time of a chip that left its reset during a transfer.
 const NEVER: Instant = Instant::from_secs(u64::MAX / 2_000_000);
 /// Slow oscillator of this specimen.
 const SLOW_OSCILLATOR: u16 = 0x03C0;
-/// Duration of a macro period per pixel clock of the laser's period: 2304 clocks of the fast oscillator, 11.8 MHz, in
-/// 64 phases, µs.
+/// Duration of a macro period per pixel clock of the laser period, µs: 2304 clocks of the fast
+/// oscillator, 11.8 MHz, in 64 phases.
 const MACRO_PERIOD: f64 = 2304.0 / 11.8 / 64.0;
-/// What a histogram takes beside its time-outs, µs, and how many those are.
+/// Duration of a histogram beyond its timeouts, µs, and number of timeouts.
 const HISTOGRAM_OVERHEAD: f64 = 1_700.0;
 const HISTOGRAM_PARTS: f64 = 6.0;
-/// What a measurement takes beside its two time-outs.
+/// Duration of a measurement beyond its two timeouts, µs.
 const OVERHEAD: f64 = 14_000.0;
 
-/// A coded number of macro periods: the low byte shifted left by the high one, plus one.
+/// Decodes a number of macro periods: the low byte shifted left by the high byte, plus one.
 fn macro_periods(code: u16) -> f64 {
     let [shift, mantissa] = code.to_be_bytes();
     f64::from(mantissa) * libm::exp2(f64::from(shift)) + 1.0
 }
 
-/// By how much the specimen of this seed measures too short, mm; never nothing.
+/// Distance by which the specimen of this seed measures too short, mm; never 0.
 fn specimen_offset(seed: u64, mount: Mount) -> i16 {
     let place = match mount {
         Mount::Bottom => 0,
@@ -158,7 +168,8 @@ fn specimen_offset(seed: u64, mount: Mount) -> i16 {
     if drawn == 0 { 7 } else { drawn }
 }
 
-/// The emulator. The same seed is the same specimen as [`RangeModel`](crate::sensors::RangeModel).
+/// The emulator. The same seed gives the same specimen as
+/// [`RangeModel`](crate::sensors::RangeModel).
 ///
 /// ```
 /// use embedded_hal::i2c::I2c;
@@ -196,21 +207,22 @@ struct State {
     /// True time per time of the chip's clock.
     pace: f64,
     id: u8,
-    /// By how much it measures too short, mm.
+    /// Distance by which it measures too short, mm.
     short: i16,
-    /// When the chip answers; never while XSHUT is low.
+    /// Instant from which the chip answers; `None` while XSHUT is low.
     ready: Option<Instant>,
-    /// Its bus is busy until then.
+    /// End of the present transfer on its bus.
     busy_until: Option<Rc<Cell<Instant>>>,
     registers: Box<[u8; SIZE]>,
-    /// Beginning of the running or coming measurement.
+    /// Begin of the running or next measurement.
     begin: Option<Instant>,
-    /// A measurement waits to be taken note of.
+    /// A measurement is waiting for its interrupt to be cleared.
     pending: bool,
     photons: Photons,
-    /// How many histograms since the last stop, and the groups of settings that were and will be sent; `None` when none are measured.
+    /// Number of histograms since the last stop, and the groups of settings in effect and sent for
+    /// the next; `None` outside histogram mode.
     histograms: Option<(u32, [u8; 2])>,
-    /// The detector feels nothing.
+    /// The detector is broken.
     broken: bool,
     flaw: Option<Flaw>,
     pointer: u16,
@@ -231,7 +243,7 @@ impl State {
         }
     }
 
-    /// Whether the chip answers at all at this instant.
+    /// True if the chip answers at this instant.
     fn answers(&self, now: Instant) -> bool {
         self.ready.is_some_and(|ready| ready <= now)
     }
@@ -247,7 +259,7 @@ impl State {
         for (register, value) in FIRMWARE {
             self.set(register, &[value]);
         }
-        // The specimen's pace is its oscillator's.
+        // The specimen's clock error is that of its oscillator.
         self.set(FAST_OSCILLATOR, &((FAST / self.pace * 4096.0).round() as u16).to_be_bytes());
         self.set(FACTORY_OFFSET, &self.short.to_be_bytes());
         self.set(RANGE_OFFSET, &((self.short * 4) & 0x1FFF).to_be_bytes());
@@ -261,7 +273,7 @@ impl State {
         self.set(MODEL, &[self.id, 0xAA, 0x10]);
     }
 
-    /// Held by its register: it answers, and does nothing.
+    /// True while the soft reset register holds the chip: it acknowledges but ignores accesses.
     fn stands_still(&self) -> bool {
         self.byte(SOFT_RESET) & 1 == 0
     }
@@ -270,7 +282,7 @@ impl State {
         Duration::from_micros((microseconds * self.pace) as u64)
     }
 
-    /// The number of the histogram that is measured now or was last, and which of the two parts it is.
+    /// Number of the present or last histogram, and its part: 0 for A, 1 for B.
     fn histogram_number(count: u32) -> (u8, usize) {
         let number = match count.saturating_sub(1) {
             early @ 0..=255 => early as u8,
@@ -279,7 +291,7 @@ impl State {
         (number, usize::from(number & 1))
     }
 
-    /// How long a measurement takes.
+    /// Duration of a measurement.
     fn duration(&self) -> Duration {
         let range = |timeout, period| {
             let clocks = 2.0 * (f64::from(self.byte(period)) + 1.0);
@@ -292,7 +304,7 @@ impl State {
         self.true_time(OVERHEAD + range(TIMEOUT_A, PERIOD_A) + range(TIMEOUT_B, PERIOD_B))
     }
 
-    /// Time from one measurement to the next.
+    /// Period of measurements.
     fn period(&self) -> Duration {
         let ticks = f64::from(u32::from_be_bytes(core::array::from_fn(|n| self.byte(PERIOD + n as u16))));
         self.true_time(ticks / (f64::from(SLOW_OSCILLATOR) * 1.075) * 1e3).max(self.duration())
@@ -308,7 +320,8 @@ impl State {
             }
             self.measure(begin);
             self.pending = self.flaw != Some(Flaw::LightMode(Nonsense::Silent));
-            // Once, or again when the period is over and this one has been taken note of.
+            // In continuous mode the next begins after the period, once this interrupt has been
+            // cleared.
             self.begin = (self.byte(MODE) == 0x40).then(|| begin + self.period());
         }
     }
@@ -347,6 +360,8 @@ impl State {
         for (place, bin) in (BINS_FROM..).step_by(3).zip(if self.broken { [0; BINS] } else { bins }) {
             self.set(place, &bin.to_be_bytes()[1..]);
         }
+        // The last bin's low byte has its bits in two registers of their own; its usual place reads
+        // zero.
         let lowest = self.byte(REFERENCE - 1);
         self.set(REFERENCE - 1, &[0]);
         self.set(REFERENCE, &phase.to_be_bytes());
@@ -386,7 +401,7 @@ impl State {
             }
             _ => {}
         }
-        // 13 bits, quarters of a millimetre.
+        // Signed 13 bits, quarters of a millimetre.
         let added = ((self.word(RANGE_OFFSET) << 3) as i16) >> 3;
         let millimetres = (reading.distance * 1e3 + 0.5) as i16 - self.short + added / 4;
         let code = match reading.status {
@@ -396,7 +411,7 @@ impl State {
             STATUS_OUT_OF_BOUNDS => 5,
             _ => 0,
         };
-        // Light comes back with the square of the distance; 40 Mcps at ten centimetres on a bright floor.
+        // Inverse square law: 40 Mcps at 0.1 m over a bright floor.
         let metres = f64::from(reading.distance).max(0.1);
         let signal = if reading.status == STATUS_SIGNAL { 0.1 } else { 0.4 / (metres * metres) };
         let rate = |mega_counts: f64| ((mega_counts * 128.0) as u16).to_be_bytes();
@@ -411,7 +426,7 @@ impl State {
 }
 
 impl Vl53l3cx {
-    /// A chip that has just been powered with XSHUT high, and that pin.
+    /// A chip after power-on with XSHUT high, and that pin.
     #[must_use]
     pub fn new(world: &World, clock: &Clock, seed: u64, mount: Mount) -> (Self, ShutdownPin) {
         let (physics, schedule): (_, Schedule) = RangePhysics::new(world, clock.now(), seed, mount);
@@ -459,6 +474,7 @@ impl OutputPin for ShutdownPin {
         let mut state = self.state.borrow_mut();
         let now = self.clock.now();
         if state.ready.is_none() {
+            // Traffic at this instant disturbs the boot of the chip.
             let in_traffic = state.busy_until.as_ref().is_some_and(|busy_until| busy_until.get() > now);
             state.ready = Some(if in_traffic { NEVER } else { now + BOOT });
         }
@@ -494,7 +510,7 @@ impl Chip for Vl53l3cx {
             CLEAR if byte & 1 != 0 => {
                 state.pending = false;
                 state.set(RESULT, &[0]);
-                // One that should have begun while the interrupt stood begins now.
+                // A measurement delayed by the interrupt begins now.
                 state.begin = state.begin.map(|begin| begin.max(now));
             }
             MODE => {
@@ -511,7 +527,7 @@ impl Chip for Vl53l3cx {
                     _ => None,
                 };
             }
-            // What the chip found and what it is cannot be written, nor what does not exist.
+            // Results, identity and registers that do not exist are read-only.
             LINE | RESULT..MODEL => {}
             ADDRESS => state.set(ADDRESS, &[byte & 0x7F]),
             _ if register < RESULT || PATCH.contains(&register) => state.set(register, &[byte]),

@@ -1,43 +1,46 @@
-//! Photons over time: what the detectors of a VL53L3CX count in a histogram, from light that travels, spreads and arrives at random.
+//! Photon counts of a VL53L3CX in a histogram: propagation, pulse shape and shot noise.
 //!
-//! The laser's pulse is a rectangle of the length that is set, blurred by the detectors' jitter; it falls anywhere between bins. It comes
-//! back weaker with the square of the distance, over ambient light, and each bin counts by Poisson's law. The part dims itself by using fewer
-//! detectors when more comes back than it wants. A pulse that takes longer than a laser period arrives in the next one.
+//! The laser's pulse is a rectangle of the configured length, blurred by the detectors' jitter, and
+//! may fall anywhere between bins. It returns with the inverse square of the distance, in addition
+//! to ambient light, and the count of each bin is Poisson distributed. The part reduces the signal
+//! by using fewer detectors when more than the wanted rate returns. A pulse delayed by more than a
+//! laser period arrives in a later one.
 //!
-//! What ST's algorithms take for granted is so here: bins of a PLL period, the phase of no distance as found by the part's own reference
-//! pulse, ambient bins that count as long as the others, distances that come out long by 2048 to 1987, and a factory's offset before that
-//! (VL53LX bare driver: `VL53LX_range_maths`, `VL53LX_hist_calc_zero_distance_phase`). *Unverified*: strength and shape of the pulse, jitter,
-//! ambient light, the places of reference pulses. How much light comes back from where is in `sensors/light.rs`. Not modelled: detectors that are
-//! still blind from the photon before.
+//! Assumptions of ST's algorithms that hold here: bins of a PLL period; the phase of zero distance
+//! as found by the part's reference pulse; ambient bins as long as the others; distances too long
+//! by 2048/1987, and the factory offset before that (VL53LX bare driver: `VL53LX_range_maths`,
+//! `VL53LX_hist_calc_zero_distance_phase`). *Unverified*: strength and shape of the pulse, jitter,
+//! ambient light, positions of the reference pulse. The light budget is in `sensors/light.rs`. Not
+//! modelled: dead time of the detectors.
 
 use crate::noise::Noise;
 use crate::sensors::light::{Echo, Echoes};
 
-/// Bins of a histogram.
+/// Number of bins of a histogram.
 pub(super) const BINS: usize = 24;
-/// Detectors that there are, less those behind smaller openings.
+/// Number of detectors without those behind smaller apertures.
 const DETECTORS: f64 = 200.0;
-/// Blur of the pulse, standard deviation in bins: 0.3 ns.
+/// Standard deviation of the blur, bins: 0.3 ns.
 const JITTER: f64 = 0.23;
 /// Speed of light in air, m/µs.
 const LIGHT: f64 = 299.704;
-/// How much longer distances come out.
+/// Factor by which distances are reported too long.
 const STRETCH: f64 = 2048.0 / 1987.0;
-/// Laser periods in which a macro period counts.
+/// Laser periods counted in a macro period.
 const COUNTED_PERIODS: f64 = 2048.0;
-/// Means above this are drawn from a normal distribution.
+/// Mean above which counts are drawn from a normal distribution.
 const MANY: f64 = 50.0;
 
-/// How a histogram is measured.
+/// Parameters of one histogram.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shot {
-    /// What comes back.
+    /// Echoes of the targets.
     pub echoes: Echoes,
-    /// Ambient light, 10⁶ photons a second on all detectors.
+    /// Ambient light, 10⁶ photons/s over all detectors.
     pub ambient: f64,
-    /// What the factory found to be missing, m.
+    /// Distance by which the specimen measures too short, m.
     pub short: f64,
-    /// A bin, µs.
+    /// Length of a bin, µs.
     pub bin: f64,
     /// Laser period, bins.
     pub period: usize,
@@ -45,19 +48,19 @@ pub(super) struct Shot {
     pub macro_periods: f64,
     /// Length of the pulse, bins.
     pub width: f64,
-    /// Photons wanted at most, 10⁶/s.
+    /// Largest wanted rate of photons, 10⁶/s.
     pub wanted: f64,
-    /// Which four bins each of the six groups counts; 7 is ambient light.
+    /// The four bins counted by each of the six groups; 7 is ambient light.
     pub groups: [u8; 6],
 }
 
-/// A specimen's optics.
+/// Optics of one specimen.
 #[derive(Debug)]
 pub(super) struct Photons {
     noise: Noise,
-    /// Phase of no distance, bins after the laser's start as set.
+    /// Phase of zero distance, bins after the configured start of the laser.
     zero: f64,
-    /// By how many bins later the laser starts for the reference pulse.
+    /// Delay of the laser's start for the reference pulse, bins.
     later: u8,
 }
 
@@ -68,20 +71,21 @@ impl Photons {
         Self { noise, zero, later }
     }
 
-    /// The reference pulse: its phase, 2048ths of a bin, and where the laser started for it.
+    /// The reference pulse: its phase, 1/2048 bin, and the start of the laser for it.
     pub(super) fn reference(&mut self, laser_start: u8) -> (u16, u8) {
         let phase = self.zero - f64::from(self.later) + 0.002 * self.noise.normal();
         ((phase * 2048.0).round() as u16, laser_start + self.later)
     }
 
-    /// A measurement by the part itself of something so near that noise is a millimetre.
+    /// A distance measured by the part itself, so near that the noise is 1 mm.
     pub(super) fn near(&mut self, metres: f64) -> f64 {
         metres + 0.001 * self.noise.normal()
     }
 
-    /// The bins, and how many detectors were in use.
+    /// Counts of the bins, and number of detectors in use.
     pub(super) fn count(&mut self, shot: &Shot) -> ([u32; BINS], f64) {
         let strength: f64 = shot.echoes.iter().map(Echo::rate).sum();
+        // Automatic reduction of the number of detectors to the wanted rate.
         let share = (shot.wanted / (strength + shot.ambient)).min(1.0);
         let exposure = shot.macro_periods * COUNTED_PERIODS * shot.bin * share;
         let period = shot.period as f64;
@@ -101,6 +105,7 @@ impl Photons {
             } else {
                 let from = f64::from(group) * 4.0 + (place % 4) as f64;
                 arriving.iter().fold(ambient, |mean, (middle, rate)| {
+                    // Pulses emitted in earlier laser periods arrive in this one as well.
                     let rounds = (-1..=8).map(|round| from + f64::from(round) * period - middle);
                     let arrived: f64 =
                         rounds.map(|from| fraction(from + 1.0, shot.width) - fraction(from, shot.width)).sum();
@@ -113,6 +118,7 @@ impl Photons {
     }
 
     fn poisson(&mut self, mean: f64) -> u32 {
+        // Knuth's multiplication method below; its run time grows with the mean.
         if mean > MANY {
             return (mean + mean.sqrt() * self.noise.normal()).round().max(0.0) as u32;
         }
@@ -125,7 +131,8 @@ impl Photons {
     }
 }
 
-/// Share of a pulse of this width, around zero, that has arrived by then: the integral of a rectangle with blurred edges.
+/// Share of a pulse of this width, centred at zero, that has arrived by `by`: integral of a
+/// rectangle with blurred edges.
 fn fraction(by: f64, width: f64) -> f64 {
     let edge = |at: f64| {
         let scaled = at / JITTER;

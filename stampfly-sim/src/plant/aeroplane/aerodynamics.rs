@@ -1,23 +1,22 @@
-//! Forces and moments of the air on wing, tail and fuselage.
+//! Aerodynamic forces and moments on wing, tail and fuselage.
 //!
-//! Linear in angles, rates and deflections up to the stall. Beyond, lift and drag blend into a flat plate's (Beard and McLain, Small
-//! Unmanned Aircraft, 2012, equations 4.9 and 4.10), which is smooth and gives way again. What is left out: the delay of the stall,
-//! its asymmetry, so nothing spins by itself; the propeller's slipstream over the tail; the loss of the controls' effect at large
-//! angles.
-
+//! Linear in angles, rates and deflections up to the stall. Beyond it, lift and drag blend smoothly
+//! into those of a flat plate (Beard and McLain, Small Unmanned Aircraft, 2012, equations 4.9 and
+//! 4.10). Neglected: hysteresis and asymmetry of the stall, so the aeroplane does not enter spins;
+//! the propeller's slipstream over the tail; the loss of control effectiveness at large angles.
 use super::{AeroplaneParameters, Surface};
 use nalgebra::Vector3;
 
-/// Below this speed through the air its forces are none, m/s.
+/// Airspeed below which aerodynamic forces are set to zero, m/s.
 const STILL: f64 = 0.05;
 
-/// How far the controls are deflected, rad, in the order of [`Surface`].
+/// Deflections of the controls, rad, in the order of [`Surface`].
 pub(super) type Angles = [f64; super::SURFACES];
 
-/// The air's flow relative to the body.
+/// Airflow relative to the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Flow {
-    /// m/s.
+    /// Airspeed, m/s.
     pub airspeed: f64,
     /// Angle of attack, rad.
     pub alpha: f64,
@@ -26,7 +25,7 @@ pub(super) struct Flow {
 }
 
 impl Flow {
-    /// Of a body that moves through the air like this, body FRD, m/s.
+    /// The flow for this velocity through the air, body FRD, m/s.
     pub(super) fn of(air: &Vector3<f64>) -> Self {
         let airspeed = air.norm();
         let beta = if airspeed > STILL { libm::asin((air.y / airspeed).clamp(-1.0, 1.0)) } else { 0.0 };
@@ -34,32 +33,37 @@ impl Flow {
     }
 }
 
-/// Errors of one specimen: moments at no angle, dimensionless about roll, pitch and yaw.
+/// Asymmetry of one specimen: dimensionless moment offsets about roll, pitch and yaw.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Warp(pub [f64; 3]);
 
-/// Share of the induced drag that is left at this height above the ground (McCormick, Aerodynamics, Aeronautics and Flight Mechanics).
+/// Share of the induced drag that remains at this height above the ground (McCormick, Aerodynamics,
+/// Aeronautics and Flight Mechanics).
 fn ground_effect(height: f64, span: f64) -> f64 {
     let ratio = 16.0 * height.max(0.0) / span;
     ratio * ratio / (1.0 + ratio * ratio)
 }
 
-/// How much of the flow has separated, 0 to 1.
+/// Separated share of the flow, 0 to 1.
 fn separation(p: &AeroplaneParameters, alpha: f64) -> f64 {
     let above = libm::exp(-p.stall_sharpness * (alpha - p.stall_alpha));
     let below = libm::exp(p.stall_sharpness * (alpha + p.stall_alpha));
     (1.0 + above + below) / ((1.0 + above) * (1.0 + below))
 }
 
-/// Lift and drag coefficient at a pitch rate that is dimensionless already.
+/// Lift and drag coefficients. `pitching` is the dimensionless pitch rate, `height` that of the
+/// wing above the ground, m.
 pub(super) fn lift_and_drag(p: &AeroplaneParameters, alpha: f64, pitching: f64, d: &Angles, height: f64) -> [f64; 2] {
     let [right, left, elevator, rudder, flaps, _] = *d;
     let separated = separation(p, alpha);
     let (sin, cos) = libm::sincos(alpha);
     let controls = p.lift_aileron * (right + left) + p.lift_flap * flaps + p.lift_elevator * elevator;
     let attached = p.lift_0 + p.lift_alpha * alpha;
+    // Lift of a flat plate, antisymmetric in the angle of attack.
     let plate = 2.0 * sin * sin.abs() * cos;
     let lift = (1.0 - separated) * attached + separated * plate + p.lift_q * pitching + controls;
+    // Induced drag is quadratic in the lift above that of least drag, and vanishes as the flow
+    // separates.
     let excess = (1.0 - separated) * (attached + controls - p.drag_lift_0);
     let induced = p.drag_induced * excess * excess * ground_effect(height, p.wing_span);
     let trimmed = p.drag_aileron * (right.abs() + left.abs())
@@ -69,11 +73,11 @@ pub(super) fn lift_and_drag(p: &AeroplaneParameters, alpha: f64, pitching: f64, 
     [lift, p.drag_0 + induced + trimmed + separated * 2.0 * (sin * sin * sin).abs()]
 }
 
-/// Pitching moment coefficient.
+/// Pitching moment coefficient at a dimensionless pitch rate.
 pub(super) fn pitching(p: &AeroplaneParameters, alpha: f64, rate: f64, d: &Angles) -> f64 {
     let [right, left, elevator, _, flaps, _] = *d;
     let separated = separation(p, alpha);
-    // The sine, so that it turns back from any angle.
+    // The sine gives a restoring moment from any angle.
     let alpha = (1.0 - separated) * alpha + separated * libm::sin(alpha);
     p.pitch_0
         + p.pitch_alpha * alpha
@@ -83,9 +87,10 @@ pub(super) fn pitching(p: &AeroplaneParameters, alpha: f64, rate: f64, d: &Angle
         + p.pitch_elevator * elevator
 }
 
-/// Force, N, and torque, N·m, of the air on the body, body FRD.
+/// Aerodynamic force, N, and torque, N·m, on the body, body FRD.
 ///
-/// `air` is the body's velocity through the air, `rate` its angular rate, both body FRD; `height` that of the wing above the ground.
+/// `air` is the velocity through the air, `rate` the angular rate, both body FRD; `height` that of
+/// the wing above the ground, m.
 pub(super) fn loads(
     p: &AeroplaneParameters,
     warp: &Warp,
@@ -99,20 +104,24 @@ pub(super) fn loads(
         return (Vector3::zeros(), Vector3::zeros());
     }
     let pressure = 0.5 * p.air_density * airspeed * airspeed * p.wing_area;
+    // Factors that make angular rates dimensionless.
     let (half_chord, half_span) = (0.5 * p.wing_chord / airspeed, 0.5 * p.wing_span / airspeed);
     let (roll, pitch, yaw) = (rate.x * half_span, rate.y * half_chord, rate.z * half_span);
     let rudder = d[Surface::Rudder as usize];
+    // Only the difference of the ailerons rolls; their sum acts as flaps.
     let aileron = d[Surface::RightAileron as usize] - d[Surface::LeftAileron as usize];
-    // The sine, so that air from the side has no more effect than from there.
+    // The sine of the sideslip, which is bounded when the air comes from the side or from behind.
     let slip = air.y / airspeed;
     let across = (air.x * air.x + air.z * air.z).sqrt();
     let (cos_a, sin_a) = if across > STILL { (air.x / across, air.z / across) } else { (1.0, 0.0) };
-    // A wing lifts by the air that crosses it (simple sweep theory).
+    // Only the flow across the wing produces lift (simple sweep theory).
     let crossing = 1.0 - slip * slip;
 
     let [lift, drag] = lift_and_drag(p, alpha, pitch, d, height);
     let lift = lift * crossing;
     let side = p.side_beta * slip + p.side_p * roll + p.side_r * yaw + p.side_rudder * rudder;
+    // Drag is opposite to the motion through the air, lift perpendicular to it in the plane of
+    // symmetry.
     let force = air * (-drag / airspeed) + Vector3::new(lift * sin_a, side, -lift * cos_a);
 
     let moment = Vector3::new(
@@ -120,6 +129,7 @@ pub(super) fn loads(
         pitching(p, alpha, pitch, d) * crossing,
         p.yaw_beta * slip + p.yaw_p * roll + p.yaw_r * yaw + p.yaw_aileron * aileron + p.yaw_rudder * rudder,
     ) + Vector3::from(warp.0);
+    // Reference lengths of the moment coefficients.
     let lengths = Vector3::new(p.wing_span, p.wing_chord, p.wing_span);
     (force * pressure, moment.component_mul(&lengths) * pressure)
 }

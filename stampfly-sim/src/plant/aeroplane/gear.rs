@@ -1,18 +1,19 @@
-//! A flat ground at z = 0, the three wheels that roll on it, and what hits it in a crash: nose, tail, fin and wing tips.
+//! Ground contact of an aeroplane on a flat ground at z = 0: three wheels, and nose, tail, fin and
+//! wing tips.
 //!
-//! Each point is a spring and a damper along the vertical, and a spring with Coulomb's limit along
-//! and across its way. A wheel's limits are its rolling friction (or its brake) along and its
-//! tyre's across, so it stands still without creeping, rolls, and does not slide. The propeller is
-//! a disc: where any of it is below the ground, it stops. On its way a tyre gives its side
-//! deflection back, after a relaxation length (Pacejka, Tyre and Vehicle Dynamics), which makes its
-//! cornering stiffness. The ground does not pull.
+//! Each point has a spring and a damper along the vertical, and springs with Coulomb's limit along
+//! and across its direction. For a wheel the limit along is its rolling friction (or brake) and the
+//! limit across that of its tyre, so a standing wheel does not creep, and a rolling one does not
+//! skid. A rolling tyre relaxes its lateral deflection over a relaxation length (Pacejka, Tyre and
+//! Vehicle Dynamics), which gives its cornering stiffness. The propeller is a disc that stops as
+//! soon as any part of it is below the ground. The ground does not pull.
 
 use super::AeroplaneParameters;
 use crate::plant::DT;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Points that can touch: nose wheel, right and left main wheel, tail skid, then propeller tip,
-/// spinner, fin, right and left wing tip.
+/// Contact points: nose wheel, right and left main wheel, tail skid, then propeller tip, spinner,
+/// fin, right and left wing tip.
 const POINTS: usize = 9;
 const WHEELS: usize = 3;
 const SKIDS: usize = 4;
@@ -24,11 +25,11 @@ struct Point {
     damping: f64,
 }
 
-/// Undercarriage and ground as the aeroplane feels them.
+/// Contact state of undercarriage and airframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gear {
     points: [Point; POINTS],
-    /// Deflection of each point along and across, m; `None` in the air.
+    /// Horizontal deflection of each point along and across, m; `None` in the air.
     deflections: [Option<[f64; 2]>; POINTS],
     /// Distance of the farthest point from the origin.
     reach: f64,
@@ -39,14 +40,15 @@ pub struct Gear {
     friction: f64,
     strikes: u64,
     scrapes: u64,
-    /// Middle of the propeller's disc, and its radius.
+    /// Centre and radius of the propeller disc.
     hub: Vector3<f64>,
     radius: f64,
 }
 
 impl Gear {
     pub(super) fn new(p: &AeroplaneParameters) -> Self {
-        // Wheels are so long that it stands level, with its origin at `gear_height`, once the springs carry the weight.
+        // The wheels are lengthened by their compression, so that it stands level with its origin
+        // at `gear_height` under its weight.
         let weight = p.mass * p.gravity;
         let on_nose = weight * p.gear_main / (p.gear_main + p.gear_nose);
         let wheel = |x: f64, y: f64, load: f64| Point {
@@ -87,7 +89,7 @@ impl Gear {
         }
     }
 
-    /// Does anything touch the ground?
+    /// True while any point touches the ground.
     #[must_use]
     pub fn contact(&self) -> bool {
         self.deflections.iter().any(Option::is_some)
@@ -99,33 +101,34 @@ impl Gear {
         core::array::from_fn(|wheel| self.deflections[wheel].is_some())
     }
 
-    /// In how many steps something has touched the ground that is no wheel: the propeller, the
-    /// spinner, the tail, the fin, a wing tip.
+    /// Number of steps in which a part other than a wheel touched the ground: propeller, spinner,
+    /// tail, fin, wing tip.
     #[must_use]
     pub fn strikes(&self) -> u64 {
         self.strikes
     }
 
-    /// In how many steps something has touched the ground that does not carry an aeroplane: as
-    /// [`strikes`](Self::strikes), but for the tail, which has a skid.
+    /// Number of steps in which a part that does not carry the aeroplane touched the ground: as
+    /// [`strikes`](Self::strikes), without the tail, which has a skid.
     #[must_use]
     pub fn scrapes(&self) -> u64 {
         self.scrapes
     }
 
-    /// Does the propeller touch the ground?
+    /// True while the propeller touches the ground.
     pub(super) fn holds_propeller(&self, position: &Vector3<f64>, attitude: &UnitQuaternion<f64>) -> bool {
         if -position.z > self.reach {
             return false;
         }
-        // From the hub to the lowest place of the disc, which stands across body x.
+        // Height difference from the hub to the lowest point of the disc, which is perpendicular to
+        // body x.
         let nose = (attitude * Vector3::x()).z;
         let lowest = self.radius * (1.0 - nose * nose).max(0.0).sqrt();
         position.z + (attitude * self.hub).z + lowest > 0.0
     }
 
-    /// Force (world) and torque (body) of the ground, with the nose wheel turned by `steering` (rad, right is positive) and the main
-    /// wheels braked by a share.
+    /// Force (world) and torque (body) of the ground, with the nose wheel turned by `steering`,
+    /// rad, positive right, and the share `brake`, 0 to 1, of the main wheels' brakes.
     pub(super) fn push(
         &mut self,
         position: &Vector3<f64>,
@@ -151,9 +154,12 @@ impl Gear {
             let is_wheel = index < WHEELS;
             strikes |= !is_wheel;
             scrapes |= index >= SKIDS;
+            // Velocity of the contact point.
             let speed = velocity + attitude * rate.cross(&point.place);
             let normal = (point.stiffness * depth + point.damping * speed.z).max(0.0);
+            // Only the nose wheel is steered.
             let turned = if index == 0 { libm::sincos(steering) } else { (0.0, 1.0) };
+            // Skids have no rolling direction; the axes of the world serve for their friction.
             let ahead = if is_wheel { ahead(attitude, turned) } else { [1.0, 0.0] };
             let limits = match index {
                 0 => [self.rolling, self.side],
@@ -164,6 +170,8 @@ impl Gear {
             let across = speed.y * ahead[0] - speed.x * ahead[1];
             let bent = deflection.get_or_insert([0.0; 2]);
             if is_wheel {
+                // Relaxation of the tyre's lateral deflection over the distance rolled in this
+                // step.
                 bent[1] -= bent[1] * (along.abs() * DT / self.relaxation).min(1.0);
             }
             let mut held = [0.0; 2];
@@ -172,7 +180,7 @@ impl Gear {
                 let wanted = -point.stiffness * bent[axis] - point.damping * speed;
                 held[axis] = wanted.clamp(-limits[axis] * normal, limits[axis] * normal);
                 if held[axis] != wanted {
-                    // It slides: the spring keeps just what friction allows.
+                    // Sliding: the spring keeps the deflection that friction can hold.
                     bent[axis] = -held[axis] / point.stiffness;
                 }
             }
@@ -187,10 +195,11 @@ impl Gear {
     }
 }
 
-/// Where a wheel rolls, world north and east: body x turned about body z by an angle whose sine and cosine are given.
+/// Rolling direction of a wheel, world north and east: body x turned about body z by an angle with
+/// the given sine and cosine.
 fn ahead(attitude: &UnitQuaternion<f64>, (sin, cos): (f64, f64)) -> [f64; 2] {
     let axis = attitude * Vector3::new(cos, sin, 0.0);
     let length = (axis.x * axis.x + axis.y * axis.y).sqrt();
-    // A wheel of an aeroplane that stands on its nose rolls nowhere in particular.
+    // Undefined with body x vertical; any direction will do.
     if length > 1e-3 { [axis.x / length, axis.y / length] } else { [1.0, 0.0] }
 }

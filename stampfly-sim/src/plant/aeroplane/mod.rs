@@ -1,10 +1,12 @@
-//! A conventional aeroplane as a body: wing, tail, one electric propeller, servos, three wheels, and the ground and the air.
+//! A conventional aeroplane: wing, tail, one electric propeller, servos, three wheels, ground and
+//! wind.
 //!
-//! Six degrees of freedom, stepped as the quadrotor is. The aerodynamics are a table of dimensionless derivatives,
-//! [`AeroplaneParameters`], which a vehicle's crate gives; the example has the published ones of the University of Minnesota's Ultra
-//! Stick 25e, at 0.27 of its mass, so that it flies at about half of its speeds and stalls at 5 m/s. No such aeroplane was built. Use
-//! [`Aeroplane`] alone to study the vehicle, a [`World`](crate::World) to put sensors into it. Not for spins, aerobatics at large
-//! angles of attack, or soft structures.
+//! Six degrees of freedom, integrated as for the quadrotor. The aerodynamics are a table of
+//! dimensionless derivatives, [`AeroplaneParameters`], given by the vehicle's crate. The example
+//! has the published derivatives of the University of Minnesota's Ultra Stick 25e at 0.27 of its
+//! mass, so it flies at about half of its speeds and stalls at 5 m/s; this aeroplane does not
+//! exist. Use [`Aeroplane`] alone to study the vehicle, and a [`World`](crate::World) to add
+//! sensors. Not for spins, aerobatics at large angles of attack, or flexible structures.
 
 mod aerodynamics;
 mod gear;
@@ -27,7 +29,8 @@ use aerodynamics::{Flow, Warp};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use servos::Servos;
 
-/// Standard deviation of the warp's moments about roll, pitch and yaw: what some tenths of a degree at ailerons, elevator and rudder do.
+/// Standard deviations of the asymmetry about roll, pitch and yaw: the effect of some tenths of a
+/// degree of aileron, elevator and rudder.
 const WARP: [f64; 3] = [0.0006, 0.003, 0.0006];
 
 /// An aeroplane in its surroundings.
@@ -61,8 +64,8 @@ pub struct Aeroplane {
 }
 
 impl Aeroplane {
-    /// An aeroplane at `pose`; `None` stands it on the runway at the origin, facing north. [`Pose::rotors`] is the propeller's speed in
-    /// units of its nominal one.
+    /// An aeroplane at `pose`; `None` places it on the runway at the origin, facing north.
+    /// [`Pose::rotors`] is the propeller speed relative to its nominal speed.
     #[must_use]
     pub fn new(parameters: &AeroplaneParameters, wind: &WindConfig, pose: Option<&Pose>, seed: u64) -> Self {
         let p = parameters;
@@ -84,6 +87,7 @@ impl Aeroplane {
         };
         Self {
             inertia,
+            // A singular tensor, possible with a large product of inertia, disables rotation.
             inverse: inertia.try_inverse().unwrap_or_else(Matrix3::zeros),
             warp: Warp(WARP.map(|deviation| deviation * p.manufacturing_spread * noise.normal())),
             motion,
@@ -96,15 +100,16 @@ impl Aeroplane {
         }
     }
 
-    /// Steady straight flight at an airspeed, m/s, on a path that climbs by an angle, rad.
+    /// Steady straight flight at this airspeed, m/s, on a path with this angle of climb, rad.
     ///
     /// # Errors
-    /// When the aeroplane cannot fly so.
+    /// If the aeroplane cannot fly this way.
     pub fn trim(parameters: &AeroplaneParameters, airspeed: f64, path: f64) -> Result<Trim, TrimError> {
         Trim::find(parameters, airspeed, path)
     }
 
-    /// Sets the surfaces, at once, and the duty cycle as a trimmed flight has them. For a start in the air.
+    /// Sets surfaces, without delay, and duty cycle to those of a trimmed flight, for a start in
+    /// the air.
     pub fn settle(&mut self, trim: &Trim) {
         self.servos.command(trim.surfaces);
         self.servos.settle();
@@ -116,17 +121,18 @@ impl Aeroplane {
         self.propeller.set_duty(duty);
     }
 
-    /// Tells the servos where to go, in shares of the largest deflection, −1 to 1, in the order of [`Surface`].
+    /// Commands the servos, in shares of the largest deflection, −1 to 1, in the order of
+    /// [`Surface`].
     pub fn set_surfaces(&mut self, shares: [f64; SURFACES]) {
         self.servos.command(shares);
     }
 
-    /// Holds a servo at a share of its largest deflection, or lets it go.
+    /// Jams a servo at a share of its largest deflection, or releases it.
     pub fn jam(&mut self, surface: Surface, at: Option<f64>) {
         self.servos.jam(surface, at);
     }
 
-    /// Where the servos are, in shares of the largest deflection.
+    /// Positions of the servos, in shares of the largest deflection.
     #[must_use]
     pub fn surfaces(&self) -> [f64; SURFACES] {
         self.servos.position()
@@ -142,6 +148,7 @@ impl Aeroplane {
         let angles = core::array::from_fn(|i| shares[i] * reaches[i]);
         let air = self.through_air();
 
+        // Tested before the step, so that a propeller in contact gives no thrust in this step.
         let held = self.gear.holds_propeller(&m.position, &m.attitude);
         let voltage = self.battery.under(p.board_current, &[self.propeller.load()]);
         let thrust = self.propeller.step(DT, voltage, air.x, held);
@@ -151,7 +158,8 @@ impl Aeroplane {
             aerodynamics::loads(p, &self.warp, &air, &m.rate, &angles, -m.position.z + p.tips_above);
         force.x += thrust.thrust;
         torque += Vector3::new(thrust.torque, thrust.thrust * p.propeller_below, 0.0);
-        // The rudder's trailing edge and the nose wheel turn the aeroplane to the same side.
+        // A positive rudder turns the nose left and steering is positive to the right, hence the
+        // sign.
         let steering = -shares[Surface::Rudder as usize] * p.steering_reach;
         let brake = shares[Surface::Brake as usize];
         let (ground_force, ground_torque) =
@@ -159,7 +167,7 @@ impl Aeroplane {
         force += m.attitude.inverse_transform_vector(&ground_force);
         torque += ground_torque;
 
-        // The gyroscopic torque at half the step, as of the quadrotor.
+        // Gyroscopic torque at the half step, as for the quadrotor.
         let acceleration = |rate: &Vector3<f64>| {
             let momentum = self.inertia * rate + Vector3::new(thrust.momentum, 0.0, 0.0);
             self.inverse * (torque - rate.cross(&momentum))
@@ -197,7 +205,7 @@ impl Aeroplane {
         Flow::of(&self.through_air()).beta
     }
 
-    /// Where it is and how it moves.
+    /// Position, attitude and their derivatives.
     #[must_use]
     pub fn motion(&self) -> &Motion {
         &self.motion
@@ -215,19 +223,19 @@ impl Aeroplane {
         &self.battery
     }
 
-    /// Undercarriage and ground.
+    /// The contact model of undercarriage and airframe.
     #[must_use]
     pub fn gear(&self) -> &Gear {
         &self.gear
     }
 
-    /// The air.
+    /// Wind and gusts.
     #[must_use]
     pub fn wind(&self) -> &Wind {
         &self.wind
     }
 
-    /// What it is made of.
+    /// The parameters.
     #[must_use]
     pub fn parameters(&self) -> &AeroplaneParameters {
         &self.parameters
@@ -235,7 +243,8 @@ impl Aeroplane {
 }
 
 impl AeroplaneParameters {
-    /// Standing on the runway at a place, world north and east, m, with a heading, rad, motor off.
+    /// Standing on the runway at this position, world north and east, m, with this heading, rad,
+    /// motor off.
     #[must_use]
     pub fn standing(&self, [north, east]: [f64; 2], heading: f64) -> Pose {
         let (sin, cos) = libm::sincos(0.5 * heading);
@@ -292,11 +301,12 @@ impl Body for Aeroplane {
 
     fn disturbance(&self) -> Disturbance {
         let p = &self.parameters;
-        // The barometer's pressure is divided among the rotors of a quadrotor; here there is one.
+        // The model divides the pressure by the number of a quadrotor's rotors; an aeroplane has
+        // one.
         Disturbance { field: [p.field_x, p.field_y, p.field_z], wash: p.static_wash * ROTORS as f64 }
     }
 
-    /// The first one is the propeller's.
+    /// Uses the first value.
     fn set_duty(&mut self, [duty, ..]: [f64; ROTORS]) {
         Self::set_duty(self, duty);
     }

@@ -1,16 +1,18 @@
-//! What an aeroplane is made of: one table, settable by name, and an example with the sources of its numbers.
+//! Parameters of an aeroplane as a table settable by name, and an example with its sources.
 
 use crate::conditions::Conditions;
 use crate::plant::battery::BatterySpec;
 use crate::plant::table::parameters;
 
 parameters! {
-    /// Airframe, aerodynamics, propulsion, undercarriage and servos of a conventional aeroplane with a nose wheel.
+    /// Airframe, aerodynamics, propulsion, undercarriage and servos of a conventional aeroplane
+    /// with a nose wheel.
     ///
-    /// Coefficients are referred to wing area, mean chord (pitch) and span (roll, yaw); lift and drag are in wind axes, side force and
-    /// moments in body axes, rates are made dimensionless with half the chord or half the span over the airspeed (Klein and Morelli,
-    /// Aircraft System Identification). Control surfaces are positive with the trailing edge down, the rudder with the
-    /// trailing edge left.
+    /// Coefficients refer to wing area, mean chord (pitch) and span (roll, yaw). Lift and drag are
+    /// in wind axes, side force and moments in body axes. Rates are made dimensionless with half
+    /// the chord or half the span divided by the airspeed (Klein and Morelli, Aircraft System
+    /// Identification). Deflections are positive with the trailing edge down, for the rudder with
+    /// the trailing edge left.
     ///
     /// ```
     /// use stampfly_sim::plant::AeroplaneParameters;
@@ -21,15 +23,18 @@ parameters! {
     /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
     /// ```
     AeroplaneParameters,
-    /// The Ultra Stick 25e of the University of Minnesota's UAV laboratory, built as light as a slow flyer, with a smaller propeller and
-    /// a nose wheel.
+    /// The Ultra Stick 25e of the University of Minnesota's UAV laboratory, with the mass of a slow
+    /// flyer, a smaller propeller and a nose wheel.
     ///
-    /// Geometry and derivatives are the published ones (UASLab/OpenFlightSim, `Simulation/aircraft/UltraStick25e`, MIT licence:
-    /// `AeroOpenFlight.xml`, `MetricsOpenFlight.xml`, identified from flights; `Engines/APC 12x6e.xml` from the maker's data). It weighs
-    /// 1.959 kg, with which it stalls at some 9.7 m/s. Here mass, moments of inertia, springs and dampers are 0.2706 of the published
-    /// (`MassOpenFlight.xml`, `Gear.xml`), so that all speeds are 0.52 of them: it stalls at 5 m/s. The propeller is the published one
-    /// scaled to 8 inches; the thrust line goes through the centre of mass, 46 mm above the published one; the undercarriage is the
-    /// published one turned round. What is not published is an assumption, and called so in the table's source.
+    /// Geometry and derivatives are published (UASLab/OpenFlightSim,
+    /// `Simulation/aircraft/UltraStick25e`, MIT licence: `AeroOpenFlight.xml`,
+    /// `MetricsOpenFlight.xml`, identified from flights; `Engines/APC 12x6e.xml` from the
+    /// manufacturer's data). The original weighs 1.959 kg and stalls at about 9.7 m/s. Here mass,
+    /// moments of inertia, springs and dampers are 0.2706 of the published values
+    /// (`MassOpenFlight.xml`, `Gear.xml`), so all speeds are 0.52 of the original and it stalls at
+    /// 5 m/s. The propeller is scaled to 8 inches; the thrust line passes through the centre of
+    /// mass, 46 mm above the published one; the undercarriage is reversed. Values that are not
+    /// published are marked as assumptions in the source of the table.
     EXAMPLE {
         // MassOpenFlight.xml times 0.2706.
         mass = 0.53 ["kg"] in 0.05 ..= 25.0, "Take-off mass, battery included.";
@@ -39,7 +44,7 @@ parameters! {
         inertia_xz = 0.00379 ["kg*m^2"] in -1.0 ..= 1.0, "Product of inertia, the integral of x times z over the mass.";
         gravity = 9.80665 ["m/s^2"] in 0.0 ..= 20.0, "Gravity (ISO 80000-3).";
         air_density = 1.225 ["kg/m^3"] in 0.3 ..= 1.5, "Density of the air (ICAO standard atmosphere at sea level).";
-        // A wing that is warped by a few tenths of a degree: an assumption.
+        // A wing warped by a few tenths of a degree: an assumption.
         manufacturing_spread = 1.0 ["1"] in 0.0 ..= 5.0, "Scales the per-seed warp of wing and tail; 0 is the perfect aeroplane.";
 
         // MetricsOpenFlight.xml.
@@ -47,16 +52,18 @@ parameters! {
         wing_span = 1.27 ["m"] in 0.2 ..= 10.0, "Wing span.";
         wing_chord = 0.25 ["m"] in 0.02 ..= 2.0, "Mean aerodynamic chord.";
 
-        // AeroOpenFlight.xml; its lift by the rate of the angle of attack (1.9724) is left out, and its side force is across the wind, not the
-        // body, which is the same at small slips.
+        // AeroOpenFlight.xml. Its lift due to the rate of the angle of attack (1.9724) is
+        // neglected. Its side force is perpendicular to the wind instead of the body, which is
+        // equivalent at small sideslip.
         lift_0 = 0.1068 ["1"] in -1.0 ..= 1.0, "Lift at no angle of attack.";
         lift_alpha = 4.58 ["1/rad"] in 1.0 ..= 7.0, "Lift by angle of attack.";
         lift_q = 6.1639 ["1"] in 0.0 ..= 20.0, "Lift by pitch rate.";
         lift_aileron = 0.23755 ["1/rad"] in 0.0 ..= 2.0, "Lift by one aileron.";
         lift_flap = 0.74 ["1/rad"] in 0.0 ..= 3.0, "Lift by both flaps.";
         lift_elevator = 0.0983 ["1/rad"] in -1.0 ..= 2.0, "Lift by elevator.";
-        // Not published. A sharp sigmoid (Beard and McLain, Small Unmanned Aircraft, 2012, equation 4.10, M of table E.2), so placed that
-        // the largest lift is 1.08 at 13 degrees, as usual for a plain wing at this Reynolds number: an assumption.
+        // Not published. A steep sigmoid (Beard and McLain, Small Unmanned Aircraft, 2012, equation
+        // 4.10, M of table E.2), placed so that the largest lift is 1.08 at 13 degrees, as usual
+        // for a plain wing at this Reynolds number: an assumption.
         stall_alpha = 0.28 ["rad"] in 0.1 ..= 1.0, "Angle of attack at which half of the wing's flow has separated.";
         stall_sharpness = 50.0 ["1/rad"] in 5.0 ..= 200.0, "How suddenly it separates.";
         // AeroOpenFlight.xml.
@@ -88,8 +95,8 @@ parameters! {
         yaw_aileron = 0.0287 ["1/rad"] in -0.5 ..= 0.5, "Yawing moment by the right aileron.";
         yaw_rudder = -0.1811 ["1/rad"] in -1.0 ..= 0.0, "Yawing moment by rudder.";
 
-        // Effectors.xml: 30 degrees, 33 rad/s, 20 ms. The speed is a small digital servo's, 60 degrees in 0.12 s over a throw of 45 degrees:
-        // an assumption.
+        // Effectors.xml: 30 degrees, 33 rad/s, 20 ms. The speed is that of a small digital servo,
+        // 60 degrees in 0.12 s over a throw of 45 degrees: an assumption.
         reach_aileron = 0.52 ["rad"] in 0.05 ..= 1.2, "Largest deflection of an aileron.";
         reach_flap = 0.52 ["rad"] in 0.0 ..= 1.2, "Largest deflection of the flaps.";
         reach_elevator = 0.52 ["rad"] in 0.05 ..= 1.2, "Largest deflection of the elevator.";
@@ -98,7 +105,8 @@ parameters! {
         servo_speed = 11.0 ["1/s"] in 0.1 ..= 1000.0, "Shares of the largest deflection that a servo runs through in a second.";
         servo_period = 0.02 ["s"] in 0.0 ..= 0.1, "Time between two pulses that tell the servos where to go.";
 
-        // Engines/APC 12x6e.xml, polynomials of the third degree through its 30 points (off by up to 0.0008 and 0.0010). Diameter 8 inches.
+        // Engines/APC 12x6e.xml: cubic polynomials through its 30 points, with errors up to 0.0008
+        // and 0.0010. Diameter 8 inches.
         propeller_diameter = 0.2032 ["m"] in 0.05 ..= 1.5, "Diameter of the propeller.";
         thrust_0 = 0.10865 ["1"] in 0.0 ..= 0.3, "Thrust coefficient at no advance.";
         thrust_1 = -0.02912 ["1"] in -1.0 ..= 1.0, "Thrust coefficient by advance ratio.";
@@ -109,7 +117,8 @@ parameters! {
         power_2 = 0.13741 ["1"] in -2.0 ..= 2.0, "Power coefficient by its square.";
         power_3 = -0.17411 ["1"] in -2.0 ..= 2.0, "Power coefficient by its cube.";
         advance_limit = 0.9 ["1"] in 0.1 ..= 3.0, "Largest advance ratio for which the coefficients are good; beyond, they stay.";
-        // The published 1.2991e-4 kg m^2 times (8/12)^5, and a motor's bell of 0.9e-5 kg m^2: an assumption, as what follows.
+        // The published 1.2991e-4 kg m^2 times (8/12)^5, plus a motor bell of 0.9e-5 kg m^2. From
+        // here to the battery: assumptions.
         propeller_inertia = 2.6e-5 ["kg*m^2"] in 1e-8 ..= 0.1, "Moment of inertia of propeller and motor.";
         propeller_spin = 1.0 ["1"] in -1.0 ..= 1.0, "1 turns clockwise seen from behind, -1 the other way; 0 has no torque on the airframe.";
         propeller_ahead = 0.298 ["m"] in -2.0 ..= 2.0, "Propeller ahead of the centre of mass.";
@@ -133,20 +142,22 @@ parameters! {
         field_z = -0.1 ["uT/A"] in -50.0 ..= 50.0, "Field of the battery current at the magnetometer, body z.";
         static_wash = 0.0 ["Pa"] in -50.0 ..= 50.0, "Pressure of the propeller's wash at the barometer in cruise.";
 
-        // Gear.xml less the centre of mass of MassOpenFlight.xml, turned round: its main wheels are 38 mm ahead of it.
+        // Gear.xml relative to the centre of mass of MassOpenFlight.xml, reversed: the published
+        // main wheels are 38 mm ahead of it.
         gear_height = 0.2238 ["m"] in 0.02 ..= 2.0, "Height of the centre of mass, standing.";
         gear_main = 0.038 ["m"] in 0.001 ..= 1.0, "Main wheels behind the centre of mass.";
         gear_nose = 0.22 ["m"] in 0.01 ..= 2.0, "Nose wheel ahead of the centre of mass.";
         gear_track = 0.3302 ["m"] in 0.02 ..= 3.0, "Distance between the main wheels.";
         gear_stiffness = 990.0 ["N/m"] in 10.0 ..= 1e5, "Spring of one wheel.";
         gear_damping = 31.5 ["N*s/m"] in 0.0 ..= 1e4, "Damper of one wheel.";
-        // Gear.xml has 0.02 and 0.5. Short grass and small wheels roll worse; brakes, steering and relaxation length are assumptions.
+        // Gear.xml has 0.02 and 0.5. Small wheels on short grass have more rolling friction;
+        // brakes, steering and relaxation length are assumptions.
         wheel_rolling = 0.08 ["1"] in 0.0 ..= 1.0, "Rolling friction.";
         wheel_side = 0.5 ["1"] in 0.0 ..= 2.0, "Friction across a wheel.";
         wheel_brake = 0.3 ["1"] in 0.0 ..= 2.0, "Friction along a main wheel that is braked.";
         wheel_relaxation = 0.04 ["m"] in 0.001 ..= 2.0, "Way on which a rolling wheel loses its side deflection.";
         steering_reach = 0.2 ["rad"] in 0.0 ..= 1.2, "Largest angle of the nose wheel, with the rudder.";
-        // The tail skid is Gear.xml's, what else can hit the ground is read off the geometry.
+        // The tail skid is from Gear.xml, the other contact points from the geometry.
         body_stiffness = 600.0 ["N/m"] in 10.0 ..= 1e5, "Spring of nose, tail, fin and wing tips.";
         body_damping = 5.0 ["N*s/m"] in 0.0 ..= 1e4, "Damper of nose, tail, fin and wing tips.";
         body_friction = 0.5 ["1"] in 0.0 ..= 2.0, "Friction of nose, tail, fin and wing tips.";
@@ -158,10 +169,11 @@ parameters! {
 }
 
 impl AeroplaneParameters {
-    /// The Ultra Stick 25e as heavy as it was published, with the propeller that it flew with: it stalls at some 9.7 m/s.
+    /// The Ultra Stick 25e with its published mass and propeller; it stalls at about 9.7 m/s.
     ///
-    /// What differs from the [example](Self::EXAMPLE) is published, too (`MassOpenFlight.xml`, `Gear.xml`, `Engines/APC 12x6e.xml`), but for springs and dampers of what is no wheel, motor and battery: 800 rpm/V on three
-    /// cells, an assumption.
+    /// The differences from the [example](Self::EXAMPLE) are published, too (`MassOpenFlight.xml`,
+    /// `Gear.xml`, `Engines/APC 12x6e.xml`), except for the springs and dampers of the airframe,
+    /// and motor and battery, which are assumptions: 800 rpm/V on three cells.
     pub const ULTRA_STICK_25E: Self = Self {
         mass: 1.959,
         inertia_x: 0.07151,
@@ -183,7 +195,7 @@ impl AeroplaneParameters {
         ..Self::EXAMPLE
     };
 
-    /// The same under these conditions: what they do to its battery.
+    /// These parameters with the battery under these conditions.
     #[must_use]
     pub fn under(&self, conditions: &Conditions) -> Self {
         let battery = self.battery().worn(conditions.battery_age).at(conditions.battery_temperature);
@@ -222,7 +234,7 @@ mod tests {
         }
     }
 
-    /// Mass and inertia are one share of the published ones.
+    /// Mass, moments of inertia and springs are the same share of the published ones.
     #[test]
     fn the_example_is_the_published_aeroplane_made_lighter() {
         let p = AeroplaneParameters::EXAMPLE;

@@ -1,14 +1,14 @@
-//! A brushless motor with a fixed propeller.
+//! Model of a brushless motor with a fixed propeller.
 //!
 //! ```text
-//! current  I = (duty·Vbat − K·ω) / R, never negative: the controller does not brake
+//! current  I = (duty·Vbat − K·ω) / R, never negative: the motor controller does not brake
 //! speed    J·dω/dt = K·(I − I0) − Q
 //! thrust   T = ρ·n²·D⁴·Ct(J),  torque  Q = ρ·n²·D⁵·Cp(J) / 2π,  advance ratio J = V / (n·D)
 //! ```
 //!
-//! A propeller that touches the ground stands: no thrust, and the current of a motor that is held.
-//!
-//! V is the speed of the air along the axis; across it the propeller feels nothing, nor do wing and tail feel its slipstream.
+//! V is the airspeed along the axis. Cross flow has no effect on the propeller, and the slipstream
+//! none on wing and tail. A propeller that touches the ground stops: no thrust, and the stall
+//! current of its motor.
 
 use super::AeroplaneParameters;
 use crate::plant::RotorFault;
@@ -16,19 +16,19 @@ use crate::plant::battery::Load;
 use core::f64::consts::TAU;
 
 /// Time constant with which a propeller that touches the ground stops, s: half a turn of a small
-/// one.
+/// propeller.
 const STOPS: f64 = 0.003;
 
-/// What the propeller does to the body in one step.
+/// Action of the propeller on the body in one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PropellerLoads {
-    /// Along body x, N.
+    /// Thrust along body x, N.
     pub thrust: f64,
-    /// Torque on the airframe about body x, N·m, gyroscopic part not included.
+    /// Torque on the airframe about body x without the gyroscopic part, N·m.
     pub torque: f64,
-    /// Angular momentum along body x.
+    /// Angular momentum along body x, N·m·s.
     pub momentum: f64,
-    /// Out of the battery, A.
+    /// Current drawn from the battery, A.
     pub current: f64,
 }
 
@@ -87,50 +87,53 @@ impl Propeller {
         self.duty
     }
 
-    /// Speed, rad/s, always positive.
+    /// Rotor speed, rad/s, never negative.
     #[must_use]
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Thrust, N, and the torque that the propeller needs, N·m, at a speed, rad/s, in this air along the axis, m/s.
+    /// Thrust, N, and drag torque, N·m, at this speed, rad/s, and axial airspeed, m/s.
     pub(super) fn at(&self, speed: f64, air: f64) -> [f64; 2] {
         let turns = speed / TAU;
+        // Limited to the range of the polynomials: outside it they are meaningless.
         let advance = (air / (turns * self.diameter).max(1e-3)).clamp(0.0, self.advance_limit);
         let polynomial = |c: &[f64; 4]| c[0] + advance * (c[1] + advance * (c[2] + advance * c[3]));
         let square = turns * turns;
         [self.scale[0] * square * polynomial(&self.thrust), self.scale[1] * square * polynomial(&self.power)]
     }
 
-    /// Voltage of the motor that keeps this speed in this air, V.
+    /// Motor voltage that holds this speed at this axial airspeed, V.
     pub(super) fn voltage(&self, speed: f64, air: f64) -> f64 {
         let current = self.at(speed, air)[1] / self.constant + self.idle_current;
         self.constant * speed + self.resistance * current.max(0.0)
     }
 
-    /// The duty cycle that the motor has, whatever is commanded.
+    /// Effective duty cycle: a stuck transistor overrides the command.
     fn switched(&self) -> f64 {
         self.fault.duty.unwrap_or(self.duty)
     }
 
-    /// What the motor is for the battery now.
+    /// The motor as a load of the battery at its present speed.
     pub(super) fn load(&self) -> Load {
         Load::of_motor(self.switched(), self.resistance, self.constant * self.speed)
     }
 
-    /// One step of `dt` seconds on `voltage`. `held`: it touches the ground.
+    /// Advances by `dt` seconds at `voltage` with the axial airspeed `air`. `held`: it touches the
+    /// ground.
     pub(super) fn step(&mut self, dt: f64, voltage: f64, air: f64, held: bool) -> PropellerLoads {
         let duty = self.switched();
         let current = ((duty * voltage - self.constant * self.speed) / self.resistance).max(0.0);
         let before = self.speed;
         if held {
-            // What stops it pushes outside of the body, which feels the motor alone.
+            // The ground takes up the braking torque; the body receives the motor's torque only.
             self.speed = before * (1.0 - dt / STOPS).max(0.0);
             let torque = -self.spin * self.constant * current;
             let momentum = self.spin * self.inertia * before;
             return PropellerLoads { thrust: 0.0, torque, momentum, current: duty * current };
         }
         let [thrust, drag] = self.at(self.speed, air);
+        // The idle current stands for friction, independent of speed.
         let net = self.constant * (current - self.idle_current) - drag;
         self.speed = (before + net / self.inertia * dt).max(0.0);
         let reaction = drag + self.inertia * (self.speed - before) / dt;
@@ -167,7 +170,7 @@ mod tests {
         assert!((0.6..0.95).contains(&efficiency), "{efficiency}");
     }
 
-    /// The maker's table: 0.0514 and 0.0317 at an advance ratio of 0.4888.
+    /// The manufacturer's table: 0.0514 and 0.0317 at an advance ratio of 0.4888.
     #[test]
     fn coefficients_are_the_published_ones() {
         let propeller = Propeller::new(&AeroplaneParameters::EXAMPLE, 0.0);
@@ -182,7 +185,7 @@ mod tests {
         let (mut propeller, before) = settled(0.5, 0.0);
         let loads = (0..32).map(|_| propeller.step(625e-6, 11.5, 0.0, true)).last().expect("steps");
         assert!(propeller.speed() < 1.0 && loads.thrust == 0.0, "{propeller:?} {loads:?}");
-        // Duty times what it drives through the winding.
+        // Duty times the winding current.
         let stall = 0.5 * 0.5 * 11.5 / AeroplaneParameters::EXAMPLE.motor_resistance;
         assert!((loads.current / stall - 1.0).abs() < 0.02 && loads.current > 3.0 * before.current, "{loads:?}");
     }

@@ -1,12 +1,12 @@
-//! Control surfaces and the servos that move them.
+//! Servos and the control surfaces that they move.
 //!
-//! A servo learns with the next pulse where to go, and goes there with a lag and no faster than it can. No play and no force: a servo
-//! is as strong as it needs to be.
+//! A servo receives its target with the next pulse and follows it with a first-order lag and a
+//! limited speed. Play and aerodynamic load are neglected.
 
 use super::AeroplaneParameters;
 use crate::plant::DT;
 
-/// What a servo moves.
+/// Actuators of an aeroplane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Surface {
@@ -18,27 +18,27 @@ pub enum Surface {
     Elevator = 2,
     /// Positive with the trailing edge left; turns the nose wheel as well.
     Rudder = 3,
-    /// Both of them, positive with the trailing edge down. They do not go up.
+    /// Both flaps, positive with the trailing edge down; they do not deflect upwards.
     Flaps = 4,
-    /// Brakes of the main wheels, 0 to 1: no surface, but moved by a servo.
+    /// Brakes of the main wheels, 0 to 1; not a surface, but moved by a servo.
     Brake = 5,
 }
 
-/// How many there are.
+/// Number of actuators.
 pub const SURFACES: usize = 6;
 
-/// The servos.
+/// State of all servos, in shares of the largest deflection.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Servos {
-    /// By the flight stack, in shares of the largest deflection.
+    /// Commands of the flight stack.
     commanded: [f64; SURFACES],
-    /// By the last pulse.
+    /// Targets received with the last pulse.
     target: [f64; SURFACES],
     position: [f64; SURFACES],
     jammed: [Option<f64>; SURFACES],
-    /// Share of the way to the target that a step goes.
+    /// Share of the distance to the target covered per step.
     gain: f64,
-    /// Longest way in a step.
+    /// Largest movement per step.
     limit: f64,
     /// Steps between two pulses.
     period: u32,
@@ -62,13 +62,13 @@ impl Servos {
     /// Commands shares of the largest deflections, −1 to 1.
     pub(super) fn command(&mut self, shares: [f64; SURFACES]) {
         self.commanded = shares;
-        // Neither goes below zero.
+        // Flaps and brakes have no negative range.
         for surface in [Surface::Flaps, Surface::Brake] {
             self.commanded[surface as usize] = self.commanded[surface as usize].max(0.0);
         }
     }
 
-    /// Puts them where they are commanded to be, for a start in flight.
+    /// Moves all servos to their commands without delay, for a start in flight.
     pub(super) fn settle(&mut self) {
         (self.target, self.position) = (self.commanded, self.commanded);
     }
@@ -77,7 +77,7 @@ impl Servos {
         self.jammed[surface as usize] = at;
     }
 
-    /// Where they are, in shares of the largest deflection.
+    /// Positions in shares of the largest deflection.
     pub(super) fn position(&self) -> [f64; SURFACES] {
         self.position
     }
@@ -88,6 +88,7 @@ impl Servos {
             (self.countdown, self.target) = (self.period, self.commanded);
         }
         for ((position, target), jammed) in self.position.iter_mut().zip(self.target).zip(self.jammed) {
+            // A jammed servo moves to its jam position with its own dynamics.
             let target = jammed.unwrap_or(target);
             *position += ((target - *position) * self.gain).clamp(-self.limit, self.limit);
         }
@@ -109,7 +110,7 @@ mod tests {
             servos.step();
             course.push(servos.position()[2]);
         }
-        // 11 shares a second at first, then the lag: 70 % after some 64 ms.
+        // Limited to 11 shares per second at first, then the lag dominates: 70 % after about 64 ms.
         let fastest = course.windows(2).map(|pair| (pair[0] - pair[1]) / DT).fold(0.0, f64::max);
         assert!((fastest - 11.0).abs() < 0.01, "{fastest}");
         let reached = course.iter().position(|share| *share < -0.7).expect("moves") as f64 * DT;

@@ -1,7 +1,7 @@
-//! Steady straight flight: which angle of attack, elevator and throttle hold an airspeed on a path.
+//! Steady straight flight: angle of attack, elevator and throttle that hold an airspeed on a path.
 //!
-//! For tests, for starts in the air, and for whoever needs the gains of an autopilot. Wings level and without sideslip; ailerons and
-//! rudder balance the propeller's torque. Not for turns.
+//! For tests, for starts in the air, and for the design of autopilot gains. Wings level, without
+//! sideslip; ailerons and rudder balance the propeller's torque. Not for turns.
 
 use super::aerodynamics::{lift_and_drag, pitching};
 use super::{AeroplaneParameters, Propeller, SURFACES, Surface};
@@ -9,15 +9,15 @@ use crate::plant::Pose;
 use core::fmt;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// No steady flight was found.
+/// Why no steady flight exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TrimError {
-    /// The wing cannot carry it at this airspeed.
+    /// The wing cannot carry the aeroplane at this airspeed.
     TooSlow,
-    /// The elevator or the ailerons do not reach.
+    /// The control surfaces do not reach far enough.
     OutOfReach,
-    /// The propeller would have to push more or less than it can.
+    /// The thrust is outside the propeller's range.
     Thrust,
 }
 
@@ -36,37 +36,39 @@ impl core::error::Error for TrimError {}
 /// Steady straight flight in still air, far from the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// m/s.
+    /// Airspeed, m/s.
     pub airspeed: f64,
-    /// Of the path above the horizon, rad.
+    /// Angle of the path above the horizon, rad.
     pub path: f64,
     /// Angle of attack, rad.
     pub alpha: f64,
     /// Deflections as shares of the largest, in the order of [`Surface`].
     pub surfaces: [f64; SURFACES],
-    /// N.
+    /// Thrust, N.
     pub thrust: f64,
-    /// Of the propeller, rad/s.
+    /// Propeller speed, rad/s.
     pub rotor_speed: f64,
-    /// That the motor needs; over the battery's, it is the duty cycle. V.
+    /// Motor voltage, V. Divided by the battery voltage it is the duty cycle.
     pub voltage: f64,
-    /// The same in units of the nominal speed, as [`Pose::rotors`] wants it.
+    /// Propeller speed relative to the nominal speed, as for [`Pose::rotors`].
     pub rotors: f64,
 }
 
 impl Trim {
-    /// Looks for it.
+    /// Finds the trim by bisection.
     pub(super) fn find(p: &AeroplaneParameters, airspeed: f64, path: f64) -> Result<Self, TrimError> {
         let pressure = 0.5 * p.air_density * airspeed * airspeed * p.wing_area;
         let weight = p.mass * p.gravity;
         let (sin_path, cos_path) = libm::sincos(path);
-        // Elevator, lift and drag at an angle of attack; the thrust follows from the balance along the path.
+        // Residual lift, deflections and thrust at an angle of attack; the thrust follows from the
+        // balance along the path.
         let balance = |alpha: f64| {
             let mut angles = [0.0; SURFACES];
             let (sin, cos) = libm::sincos(alpha);
             let mut thrust = 0.0;
             let mut lift = 0.0;
-            // Thrust and elevator depend on each other a little, by the drag of the one and the moment of the other.
+            // Thrust and elevator depend weakly on each other, through drag and pitching moment:
+            // fixed-point iteration converges.
             for _ in 0..8 {
                 let nose_up = thrust * p.propeller_below / (pressure * p.wing_chord);
                 let elevator = -(pitching(p, alpha, 0.0, &[0.0; SURFACES]) + nose_up) / p.pitch_elevator;
@@ -77,7 +79,7 @@ impl Trim {
             }
             (lift + thrust * sin - weight * cos_path, angles, thrust)
         };
-        // From before the stall upside down to where the lift is largest, more angle is more lift.
+        // Lift grows monotonically from below the negative stall up to the angle of largest lift.
         let (mut low, mut high) = (-0.6 * p.stall_alpha, 0.0);
         while balance(high + 1e-3).0 > balance(high).0 && high < 1.0 {
             high += 1e-3;
@@ -93,9 +95,11 @@ impl Trim {
         let (_, angles, thrust) = balance(alpha);
 
         let propeller = Propeller::new(p, 0.0);
+        // The propeller sees the component along its axis.
         let air = airspeed * libm::cos(alpha);
         let (mut slow, mut fast) = (0.1, 4.0 * p.propeller_nominal_speed);
-        // Thrust falls before it rises: a windmill brakes more the faster it turns. The least is at the limit of the advance ratio.
+        // Thrust is not monotonic at low speed: a windmill brakes more the faster it turns. Its
+        // minimum is at the limit of the advance ratio.
         slow += core::f64::consts::TAU * air / (p.advance_limit * p.propeller_diameter);
         if propeller.at(slow, air)[0] > 0.0 {
             slow = 0.1;
@@ -110,10 +114,11 @@ impl Trim {
         let rotor_speed = 0.5 * (slow + fast);
         let torque = propeller.at(rotor_speed, air)[1] * p.propeller_spin;
 
-        // Ailerons against the torque, and the rudder against the ailerons' yaw.
+        // Ailerons balance the torque, and the rudder the yawing moment of the ailerons.
         let rolling = torque / (pressure * p.wing_span);
         let determinant = p.roll_aileron * p.yaw_rudder - p.roll_rudder * p.yaw_aileron;
-        // Both ailerons: twice the right one's half of the difference.
+        // The coefficient is per right aileron and the left one acts equally, so each gets half of
+        // the difference.
         let difference = rolling * p.yaw_rudder / determinant;
         let rudder = -rolling * p.yaw_aileron / determinant;
         let mut surfaces = [0.0; SURFACES];
@@ -136,13 +141,14 @@ impl Trim {
         })
     }
 
-    /// Pitch of the body, rad.
+    /// Pitch angle of the body, rad.
     #[must_use]
     pub fn pitch(&self) -> f64 {
         self.alpha + self.path
     }
 
-    /// The aeroplane in this flight at a height above the ground, m, over the origin, in still air, with this heading, rad.
+    /// Pose of this flight above the origin at this height above the ground, m, in still air, with
+    /// this heading, rad.
     #[must_use]
     pub fn pose(&self, height: f64, heading: f64) -> Pose {
         let (sin_yaw, cos_yaw) = libm::sincos(0.5 * heading);

@@ -1,13 +1,14 @@
-//! What rotors and their surroundings do to each other through the air, beyond drag and the cushion over the floor.
+//! Aerodynamic interaction of rotors with their surroundings, beyond drag and ground effect.
 //!
-//! | part | what it is |
+//! | part | effect |
 //! |---|---|
-//! | [`near`] | ceilings and walls draw |
-//! | [`vortex_ring`] | who sinks into his own wake loses thrust |
-//! | [`room`] | the wake comes back from the walls of a small room |
+//! | [`near`] | ceilings and walls attract the rotors |
+//! | [`vortex_ring`] | loss of thrust when sinking into the own wake |
+//! | [`room`] | the wake recirculates in a small room |
 //!
-//! All of it goes by the induced velocity of the rotors in a hover, `v = √(T / 2ρA)` (momentum theory): 7.3 m/s for a StampFly, whose discs
-//! are small for its weight, and half of that for most vehicles of its kind. None of it is there unless the [conditions](Conditions) have it.
+//! The effects scale with the induced velocity in hover, `v = √(T / 2ρA)` (momentum theory): 7.3
+//! m/s for a StampFly, whose discs are small for its weight, and half of that for most vehicles of
+//! its kind. Each effect is off unless the [conditions](Conditions) enable it.
 
 mod near;
 mod room;
@@ -23,7 +24,7 @@ use vortex_ring::VortexRing;
 /// Density of air in a room, kg/m³.
 const DENSITY: f64 = 1.2;
 
-/// What the air does beyond the plain plant.
+/// Effects enabled for one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Air {
     radius: f64,
@@ -37,7 +38,7 @@ pub(super) struct Air {
     room: Option<Room>,
 }
 
-/// Force and torque on the body, in its frame.
+/// Force and torque on the body, in the body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Push {
     pub force: Vector3<f64>,
@@ -45,7 +46,7 @@ pub(super) struct Push {
 }
 
 impl Air {
-    /// `None` when the conditions have none of it.
+    /// `None` if the conditions enable no effect.
     pub fn new(p: &PlantParameters, conditions: &Conditions, seed: u64) -> Option<Self> {
         let area = ROTORS as f64 * core::f64::consts::PI * p.rotor_radius * p.rotor_radius;
         let weight = p.mass * p.gravity;
@@ -59,7 +60,7 @@ impl Air {
         is_there.then_some(Self { radius: p.rotor_radius, area, induced, ceiling, wall, vortex_ring, room })
     }
 
-    /// Factor on the thrust of rotors under the scene's ceiling.
+    /// Factor on the thrust due to the scene's ceiling.
     pub fn lift(&self, motion: &Motion, scene: &Scene) -> f64 {
         match scene.ceiling {
             Some(height) if self.ceiling > 0.0 => {
@@ -69,23 +70,26 @@ impl Air {
         }
     }
 
-    /// Velocity of what comes back from the walls now, world, m/s.
+    /// Present velocity of the recirculating air, world, m/s.
     pub fn returning(&self) -> Vector3<f64> {
         self.room.as_ref().map_or_else(Vector3::zeros, Room::velocity)
     }
 
-    /// The same after one step. `share`: rotor speed in units of a hover's.
+    /// Advances the recirculating air by one step and returns its velocity. `share` is the rotor
+    /// speed relative to hover.
     pub fn wind(&mut self, share: f64) -> Vector3<f64> {
         self.room.as_mut().map_or_else(Vector3::zeros, |room| room.step(DT, share))
     }
 
-    /// One step: `air` is the velocity through the air, body, m/s.
+    /// Force and torque of vortex ring and wall in one step. `air` is the velocity through the air,
+    /// body, m/s.
     pub fn push(&mut self, motion: &Motion, scene: &Scene, air: &Vector3<f64>, share: f64) -> Push {
         let mut push = match &mut self.vortex_ring {
             Some(ring) => ring.step(DT, air, share),
             None => Push { force: Vector3::zeros(), torque: Vector3::zeros() },
         };
         if let Some(wall) = scene.wall.filter(|_| self.wall > 0.0) {
+            // Volume flow through all discs; the induced velocity is proportional to rotor speed.
             let flow = self.area * self.induced * share;
             let force = self.wall * near::beside_wall(-wall.depth(&motion.position), flow, self.radius);
             let toward = Vector3::new(wall.ahead[0], wall.ahead[1], 0.0) * force;

@@ -1,23 +1,28 @@
-//! Ceilings and walls, which draw: air that is sucked in between them and the rotors has little room, is fast, and has little pressure.
+//! Attraction by ceilings and walls: the inflow between rotor and surface is fast and its pressure
+//! low.
 //!
-//! **Ceiling.** Between a disc of radius R and a ceiling at distance d above it the air comes in from all sides, at radius r with `v·r/2d` when it goes through the disc
-//! with v. Bernoulli and the balance of momentum, in which the ceiling is drawn as strongly as the disc, give for the disc
-//! `T = 2ρA·v²·γ²` with `γ² = 1 + 1/32·(R/d)²`; far away it is the momentum theory's (this is the model of Hsiao and Chirarattananon, Ceiling effects for hybrid
-//! aerial-surface locomotion of small rotorcraft, 2019, who measured it with propellers of 23 and 50 mm radius). So the same thrust needs less inflow, and blades
-//! that turn as fast as before make more of it: `T = T₀·(1 + s·(1 − v/v₀))`. The blades' slope s is 2 here: usual for propellers of that pitch.
+//! **Ceiling.** Between a disc of radius R and a ceiling at distance d above it, air enters from
+//! all sides, at radius r with `v·r/2d` for a velocity v through the disc. Bernoulli's equation and
+//! the momentum balance, in which the ceiling is attracted as strongly as the disc, give `T =
+//! 2ρA·v²·γ²` for the disc with `γ² = 1 + 1/32·(R/d)²`, which approaches momentum theory at large
+//! distance (model of Hsiao and Chirarattananon, Ceiling effects for hybrid aerial-surface
+//! locomotion of small rotorcraft, 2019, validated with propellers of 23 and 50 mm radius). The
+//! same thrust then needs less inflow, so blades at the same speed produce more: `T = T₀·(1 + s·(1
+//! − v/v₀))`. The slope s of the blades is 2, usual for propellers of this pitch.
 //!
-//! **Wall.** The rotors are a sink for the air around. A sink at distance d from a wall feels its image behind it, which draws it with
-//! `ρQ²/16πd²` (Lagally's theorem); Q is the flow through all rotors. That is 1 % of a StampFly's weight at 5 cm.
+//! **Wall.** The rotors are a sink for the surrounding air. A sink at distance d from a wall is
+//! attracted by its image with `ρQ²/16πd²` (Lagally's theorem), where Q is the flow through all
+//! rotors: 1 % of a StampFly's weight at 5 cm.
 
 use super::DENSITY;
 use core::f64::consts::PI;
 
-/// How much less the blades push for more inflow.
+/// Relative loss of thrust per relative increase of inflow, s.
 const SLOPE: f64 = 2.0;
-/// Nothing comes nearer to a ceiling or wall than this, in radii: there is a frame around.
+/// Least distance from a ceiling, in radii, given by the frame.
 const NEAREST: f64 = 0.2;
 
-/// Thrust of rotors under a ceiling over that of free ones as fast; `distance` from the ceiling in radii.
+/// Thrust of rotors under a ceiling relative to free rotors of the same speed; `distance` in radii.
 pub(super) fn under_ceiling(distance: f64) -> f64 {
     let distance = distance.max(NEAREST);
     let gamma = (1.0 + 1.0 / (32.0 * distance * distance)).sqrt();
@@ -27,7 +32,8 @@ pub(super) fn under_ceiling(distance: f64) -> f64 {
     u * u
 }
 
-/// Force towards a wall, N, of rotors with this flow, m³/s, at a distance, m.
+/// Attraction by a wall, N, for this flow through the rotors, m³/s, at this distance, m. The
+/// distance is limited to two radii.
 pub(super) fn beside_wall(distance: f64, flow: f64, radius: f64) -> f64 {
     let distance = distance.max(2.0 * radius);
     DENSITY * flow * flow / (16.0 * PI * distance * distance)
@@ -45,7 +51,7 @@ mod tests {
         assert!(under_ceiling(0.0) < 1.4, "it does not hold for ever: {}", under_ceiling(0.0));
     }
 
-    /// Both equations of the file's comment.
+    /// Both equations of the module documentation hold.
     #[test]
     fn momentum_and_blades_agree() {
         for distance in [0.2, 0.5, 1.0, 3.0] {

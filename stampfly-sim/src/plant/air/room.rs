@@ -1,59 +1,65 @@
-//! A small room: the wake goes down, along the floor, up the walls and comes back.
+//! Recirculation in a small room: the wake goes down, along the floor, up the walls and returns.
 //!
-//! The wake of a multirotor is a round turbulent jet from two or three of its diameters on (Bauersfeld et al., Robotics meets fluid dynamics, arXiv 2403.13321), and all that a
-//! jet does far from where it starts goes by its momentum alone: speeds are some multiple of `√(T/ρ)/L` at the distance L. What comes back in a closed room of side L is taken to have
-//! this as its standard deviation along each axis: 0.18 m/s for a StampFly in a room of 3 m, less than half of the 0.43 m/s that the jet itself has left
-//! after a way of three sides (7.0·√(T/ρ) over it, a round jet's middle). It takes its time to come, and wanders as slowly as the air in the room turns
-//! over, *unverified* in its factors.
+//! The wake of a multirotor is a round turbulent jet from two or three diameters on (Bauersfeld et
+//! al., Robotics meets fluid dynamics, arXiv 2403.13321). Far from its origin a jet depends on its
+//! momentum only: speeds are multiples of `√(T/ρ)/L` at distance L. In a closed room of side L the
+//! returning air is assumed to have this as standard deviation along each axis: 0.18 m/s for a
+//! StampFly in a room of 3 m, less than half of the 0.43 m/s on the axis of the jet after three
+//! sides (7.0·√(T/ρ) divided by the distance). It builds up and wanders with the turnover time of
+//! the air in the room; these factors are *unverified*.
 
 use super::DENSITY;
 use crate::noise::Noise;
 use crate::normals::Normals;
 use nalgebra::Vector3;
 
-/// Air that goes around takes so many sides of the room to forget where it went.
+/// Correlation time in turnover times, side divided by velocity.
 const MEMORY: f64 = 0.25;
-/// Time between two steps of what is slow, s.
+/// Period of the slow update, s.
 const PERIOD: f64 = 0.01;
 
-/// The air of a small room.
+/// Recirculating air of a small room.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Room {
     noise: Normals,
-    /// Standard deviation of the air's velocity in a long hover, m/s.
+    /// Standard deviation of the velocity in a long hover, m/s.
     deviation: f64,
     /// Correlation time, s.
     time: f64,
-    /// Of unit variance.
+    /// Direction and relative magnitude of the flow: a process of unit variance per axis.
     swirl: Vector3<f64>,
-    /// Thrust whose wake has come back, in weights.
+    /// Low-passed squared rotor speed: thrust whose wake has returned, in weights.
     stirred: f64,
     since: f64,
 }
 
 impl Room {
-    /// A room of this side, m, with a vehicle of this weight, N.
+    /// A room with this side, m, and a vehicle of this weight, N.
     pub fn new(side: f64, weight: f64, mut noise: Noise) -> Self {
         let deviation = (weight / DENSITY).sqrt() / side;
+        // The direction is drawn at once; its strength grows with `stirred`, so the air is still at
+        // first.
         let swirl = noise.normal3();
         let time = MEMORY * side / deviation.max(1e-3);
         Self { noise: noise.into(), deviation, time, swirl, stirred: 0.0, since: 0.0 }
     }
 
-    /// Its velocity after one step with rotors at this share of their hover speed.
+    /// Advances by `dt` seconds with rotors at the share `share` of their hover speed and returns
+    /// the velocity.
     pub fn step(&mut self, dt: f64, share: f64) -> Vector3<f64> {
         self.since += dt;
         if self.since >= PERIOD {
             let keep = libm::exp(-self.since / self.time);
             let drive = (1.0 - keep * keep).sqrt();
             self.swirl = self.swirl * keep + Vector3::from(self.noise.next()) * drive;
+            // The returning flow follows the thrust with the correlation time.
             self.stirred += (share * share - self.stirred) * (1.0 - keep);
             self.since = 0.0;
         }
         self.velocity()
     }
 
-    /// Velocity of what comes back, world, m/s.
+    /// Velocity of the recirculating air, world, m/s.
     pub fn velocity(&self) -> Vector3<f64> {
         self.swirl * (self.deviation * self.stirred.sqrt())
     }

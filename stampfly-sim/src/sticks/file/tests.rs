@@ -1,4 +1,4 @@
-//! Files as people write them, and as nobody should.
+//! Valid and invalid stick files.
 
 use super::*;
 use proptest::prelude::*;
@@ -87,7 +87,7 @@ fn what_is_too_much_is_refused_before_it_is_read() {
     let many: String = (0..=MOST_ROWS).map(row).collect();
     assert_eq!(refused(&many), format!("line {}: there are more than {MOST_ROWS} rows", MOST_ROWS + 2));
     let held = "0,0,0,0,0,acro,1\n".repeat(MOST_BYTES / 17 + 10);
-    // As it is read from a file, cut off in a line.
+    // Cut off within a line, as when reading stops at the limit.
     let cut = format!("{HEADER}\n{held}");
     let cut = StickFile::parse(&cut.as_bytes()[..=MOST_BYTES]).expect_err("too large");
     assert_eq!(cut.kind, StickErrorKind::TooLarge, "{cut}");

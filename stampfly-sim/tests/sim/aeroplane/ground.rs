@@ -1,10 +1,10 @@
-//! On the runway: it steers, brakes, coasts straight, and notes what it hits.
+//! Aeroplane on the runway: steering, braking, coasting, and contact of its parts.
 
 use super::{PERFECT, heading, roll, with};
 use nalgebra::Vector3;
 use stampfly_sim::plant::{Aeroplane, Pose, Surface, WindConfig};
 
-/// Rolling north at a speed, after a second in which springs and tyres settle.
+/// Rolls north at a speed, after one second in which springs and tyres settle.
 fn rolling(speed: f64, surfaces: &[(Surface, f64)]) -> Aeroplane {
     let standing = PERFECT.standing([0.0; 2], 0.0);
     let pose = Pose { velocity: Vector3::new(speed, 0.0, 0.0), ..standing };
@@ -22,7 +22,7 @@ fn it_coasts_straight_without_a_pilot_and_comes_to_rest() {
     let mut plane = rolling(5.0, &[]);
     run(&mut plane, 15.0);
     let motion = plane.motion();
-    // v² / (2·μ·g) = 15.9 m, less what the air takes.
+    // v² / (2·μ·g) = 15.9 m, less the effect of aerodynamic drag.
     assert!((12.0..16.0).contains(&motion.position.x) && motion.velocity.norm() < 1e-4, "{motion:?}");
     assert!(motion.position.y.abs() < 1e-6 && heading(&plane).abs() < 1e-6);
 }
@@ -36,7 +36,7 @@ fn it_turns_as_the_nose_wheel_and_the_wheelbase_say() {
         run(&mut plane, 0.5);
         let rate = (heading(&plane) - before) / 0.5;
         let speed = 0.5 * (start + plane.motion().velocity.norm());
-        // Of a bicycle: speed · tan(angle) / wheelbase.
+        // Bicycle model: speed · tan(angle) / wheelbase.
         let expected = speed * (0.1f64).tan() / (PERFECT.gear_nose + PERFECT.gear_main);
         assert!((rate * side / expected - 1.0).abs() < 0.1, "{rate} rad/s, expected {expected}");
         assert!(plane.gear().wheels() == [true; 3] && roll(&plane).abs() < 0.05);
@@ -50,7 +50,7 @@ fn brakes_stop_it_in_a_third_of_the_way_and_without_tipping() {
     let (way, motion) = (plane.motion().position.x, plane.motion());
     assert!((3.0..6.0).contains(&way) && motion.velocity.norm() < 1e-4, "{motion:?}");
     assert_eq!(plane.gear().strikes(), 0);
-    // And they hold it against power that moves it otherwise.
+    // The brakes also hold against power that otherwise moves the aeroplane.
     let moved = |surfaces: &[(Surface, f64)]| {
         let mut plane = rolling(0.0, surfaces);
         run(&mut plane, 1.0);
@@ -88,7 +88,7 @@ fn a_cross_wind_pushes_but_does_not_turn_it_over() {
     assert!(roll(&plane).abs() < 0.05 && plane.gear().strikes() == 0, "{:?}", plane.motion());
 }
 
-/// It used to turn in the ground, and to pull the aeroplane along on its back.
+/// Regression: the propeller used to turn in the ground and pull the overturned aeroplane along.
 #[test]
 fn a_propeller_that_touches_the_ground_stands_and_takes_the_current_of_a_stall() {
     let turned = |angle: f64, axis: Vector3<f64>| {

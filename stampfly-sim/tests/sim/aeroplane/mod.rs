@@ -1,4 +1,5 @@
-//! The aeroplane flies as aeroplanes do: numbers from flight mechanics, without any of the code that makes the forces.
+//! Aeroplane in flight, compared with flight mechanics computed without the simulator's force
+//! models.
 
 mod ground;
 mod modes;
@@ -9,7 +10,7 @@ use stampfly_sim::plant::{Aeroplane, AeroplaneParameters, Pose, SURFACES, Surfac
 const PERFECT: AeroplaneParameters =
     AeroplaneParameters { manufacturing_spread: 0.0, propeller_spin: 0.0, ..AeroplaneParameters::EXAMPLE };
 
-/// As heavy, and on as hard springs, as it was published.
+/// With the published mass and spring stiffness.
 const PUBLISHED: AeroplaneParameters =
     AeroplaneParameters { manufacturing_spread: 0.0, propeller_spin: 0.0, ..AeroplaneParameters::ULTRA_STICK_25E };
 
@@ -19,7 +20,7 @@ fn fly(parameters: &AeroplaneParameters, trim: &Trim, height: f64) -> Aeroplane 
     plane
 }
 
-/// One step with the voltage that the trim wants.
+/// One step with the voltage of the trim.
 fn step(plane: &mut Aeroplane, trim: &Trim) {
     plane.set_duty(trim.voltage / plane.battery().voltage());
     plane.step();
@@ -61,7 +62,7 @@ fn trimmed_flight_holds_airspeed_and_height_for_a_minute() {
     }
 }
 
-/// Its speeds grow with the root of its mass: the laboratory flew it at 17 to 19 m/s.
+/// Speeds grow with the square root of the mass: the laboratory flew the original at 17 to 19 m/s.
 #[test]
 fn as_heavy_as_published_it_flies_at_its_published_speeds() {
     let slowest = (80..120).map(|v| f64::from(v) * 0.1).find(|v| Aeroplane::trim(&PUBLISHED, *v, 0.0).is_ok());
@@ -73,7 +74,8 @@ fn as_heavy_as_published_it_flies_at_its_published_speeds() {
     assert!((plane.motion().position.z + PUBLISHED.gear_height).abs() < 1e-4 && plane.motion().velocity.norm() < 1e-6);
 }
 
-/// The propeller's torque is balanced, too: after ten seconds without a pilot the wings are still about level.
+/// The propeller's torque is balanced: after ten seconds without control the wings are nearly
+/// level.
 #[test]
 fn trim_balances_the_propellers_torque() {
     let parameters = AeroplaneParameters { manufacturing_spread: 0.0, ..AeroplaneParameters::EXAMPLE };
@@ -92,7 +94,7 @@ fn it_stalls_near_five_metres_a_second_and_recovers_by_itself() {
     let slowest = (400..700).map(|v| f64::from(v) * 0.01).find(|v| Aeroplane::trim(&PERFECT, *v, 0.0).is_ok());
     assert!(slowest.is_some_and(|v| (4.8..5.2).contains(&v)), "{slowest:?}");
 
-    // Without power, with the nose held higher and higher.
+    // Without power, with the nose raised continuously.
     let trim = Aeroplane::trim(&PERFECT, 7.0, 0.0).expect("flies");
     let mut plane = fly(&PERFECT, &trim, 100.0);
     let (mut slow, mut sinks) = (f64::MAX, 0.0f64);
@@ -105,7 +107,7 @@ fn it_stalls_near_five_metres_a_second_and_recovers_by_itself() {
         sinks = sinks.max(plane.motion().velocity.z);
     }
     assert!(slow < 5.0 && sinks > 2.0, "{slow} m/s, sinks at {sinks} m/s");
-    // Let go, it dives and flies.
+    // Released, it dives and flies again.
     for _ in 0..8 * 1600 {
         plane.set_surfaces(trim.surfaces);
         step(&mut plane, &trim);
@@ -142,7 +144,7 @@ fn without_drag_and_thrust_energy_is_conserved() {
         heights = (heights.0.min(height), heights.1.max(height));
     }
     assert!(heights.1 - heights.0 > 3.0, "there was something to exchange: {heights:?}");
-    // Joules per kilogram; the flight exchanges 50 of them.
+    // J/kg; the flight exchanges 50 of them.
     assert!((energy(&plane) - before).abs() < 0.5, "{} of {before}", energy(&plane) - before);
 }
 
@@ -195,7 +197,8 @@ fn it_stands_still_on_the_runway() {
     }
 }
 
-/// Roll, rotate at 7 m/s, climb, with the simplest of autopilots; then a landing with power off, and a stop.
+/// Take-off roll, rotation at 7 m/s and climb with a minimal autopilot; then a landing with power
+/// off, and a stop.
 #[test]
 fn it_takes_off_lands_and_stops() {
     let parameters = AeroplaneParameters::EXAMPLE;
@@ -254,7 +257,7 @@ fn it_takes_off_lands_and_stops() {
     assert!(time < 119.0 && plane.gear().strikes() == 0, "{time} s, {:?}", plane.gear());
 }
 
-/// Whatever the controls do and however it hits the ground, numbers stay numbers and small.
+/// For any controls and any ground contact, all values stay finite and bounded.
 #[test]
 fn no_crash_explodes() {
     for seed in 0..60u64 {

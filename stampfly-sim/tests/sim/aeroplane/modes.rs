@@ -1,11 +1,13 @@
-//! Small motions are the textbook's: the linear equations of flight (Etkin and Reid, Dynamics of Flight, 1996, chapter 4) with the published
-//! derivatives, written down here without any of the simulator's code, against the simulated course.
+//! Small motions compared with the linear equations of flight (Etkin and Reid, Dynamics of Flight,
+//! 1996, chapter 4) with the published derivatives, written here independently of the simulator's
+//! code.
 
 use super::{PERFECT, fly, roll, step};
 use nalgebra::{Complex, Matrix4, UnitQuaternion, Vector3, Vector4};
 use stampfly_sim::plant::{Aeroplane, AeroplaneParameters, Trim, WindConfig};
 
-/// A propeller whose thrust does not fall with airspeed, so that the textbook's equations need no term for it.
+/// A propeller whose thrust is independent of airspeed, so that the textbook's equations need no
+/// term for it.
 const P: AeroplaneParameters = AeroplaneParameters {
     thrust_1: 0.0,
     thrust_2: 0.0,
@@ -21,7 +23,7 @@ fn trim() -> Trim {
     Aeroplane::trim(&P, SPEED, 0.0).expect("flies")
 }
 
-/// Of speed, angle of attack, pitch rate and pitch.
+/// System matrix of speed, angle of attack, pitch rate and pitch.
 fn longitudinal(trim: &Trim) -> Matrix4<f64> {
     let p = P;
     let force = 0.5 * p.air_density * SPEED * SPEED * p.wing_area / p.mass;
@@ -50,7 +52,7 @@ fn longitudinal(trim: &Trim) -> Matrix4<f64> {
     )
 }
 
-/// Of sideslip, roll rate, yaw rate and bank.
+/// System matrix of sideslip, roll rate, yaw rate and bank.
 fn lateral(trim: &Trim) -> Matrix4<f64> {
     let p = P;
     let force = 0.5 * p.air_density * SPEED * SPEED * p.wing_area / p.mass;
@@ -62,7 +64,7 @@ fn lateral(trim: &Trim) -> Matrix4<f64> {
     let by_slip = turn(p.roll_beta, p.yaw_beta);
     let by_roll = turn(p.roll_p, p.yaw_p) * half;
     let by_yaw = turn(p.roll_r, p.yaw_r) * half;
-    // The drag acts on the slip, too: its part across the body.
+    // Drag contributes to the side force in sideslip: its component across the body.
     let drag = trim.thrust / p.mass / force;
     let (sin, cos) = trim.alpha.sin_cos();
     Matrix4::new(
@@ -85,7 +87,7 @@ fn lateral(trim: &Trim) -> Matrix4<f64> {
     )
 }
 
-/// The state after each step, by the classical Runge-Kutta method.
+/// States after each step, by the classical Runge-Kutta method.
 fn course(a: &Matrix4<f64>, mut x: Vector4<f64>, steps: usize) -> Vec<Vector4<f64>> {
     let dt = 1.0 / 1600.0;
     (0..steps)
@@ -100,7 +102,7 @@ fn course(a: &Matrix4<f64>, mut x: Vector4<f64>, steps: usize) -> Vec<Vector4<f6
         .collect()
 }
 
-/// Largest difference between two courses, over the largest value, of each state.
+/// Largest difference between two courses relative to the largest value, for each state.
 fn differences(simulated: &[Vector4<f64>], predicted: &[Vector4<f64>]) -> [f64; 4] {
     core::array::from_fn(|i| {
         let largest = predicted.iter().map(|x| x[i].abs()).fold(0.0, f64::max);
@@ -114,7 +116,7 @@ fn modes(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
     roots
 }
 
-/// Natural period, s, and damping ratio of an oscillation.
+/// Period, s, and damping ratio of an oscillation.
 fn oscillation(root: Complex<f64>) -> (f64, f64) {
     let natural = root.re.hypot(root.im);
     (core::f64::consts::TAU / natural, -root.re / natural)
@@ -157,7 +159,7 @@ fn slip_and_bank_go_as_the_linear_equations_say() {
         pose.rate.x = start[1];
         let mut plane = Aeroplane::new(&P, &WindConfig::CALM, Some(&pose), 1);
         plane.settle(&trim);
-        // Bank at a pitch turns some of the angle of attack into sideslip.
+        // At a pitch angle, bank converts part of the angle of attack into sideslip.
         let start = Vector4::new(plane.beta(), start[1], 0.0, start[3]);
         let simulated: Vec<_> = (0..4 * 1600)
             .map(|_| {
@@ -180,11 +182,12 @@ fn the_modes_are_those_of_an_aeroplane() {
     let side = modes(&lateral(&trim));
     let (spiral, dutch, subsidence) = (side[0], oscillation(side[1]), side[3]);
     println!("phugoid {phugoid:?}, short period {short:?}, dutch roll {dutch:?}, spiral {spiral}, roll {subsidence}");
-    // Lanchester's phugoid would have 4.5 s; so light an aeroplane is damped in pitch so strongly that it takes twice as long.
+    // Lanchester's approximation gives 4.5 s; the strong pitch damping of so light an aeroplane
+    // doubles the period.
     assert!((8.0..12.0).contains(&phugoid.0) && (0.1..0.5).contains(&phugoid.1), "{phugoid:?}");
     assert!(short.0 < 0.5 && short.1 > 0.7, "{short:?}");
     assert!((0.5..1.5).contains(&dutch.0) && (0.2..0.8).contains(&dutch.1), "{dutch:?}");
-    // The spiral may diverge, slowly.
+    // The spiral mode may diverge slowly.
     assert!(spiral.im == 0.0 && spiral.re.abs() < 0.1 && subsidence.re < -10.0, "{spiral} {subsidence}");
 }
 

@@ -7,7 +7,7 @@ use embedded_hal::spi::SpiDevice;
 use stampfly_sim::Simulation;
 use stampfly_sim::chips::{Attached, Bmi270, I2cBus, SpiBus, SpiPort};
 
-/// A stand-in for the maker's file, in which no two bursts are equal.
+/// A placeholder for the manufacturer's file, in which no two bursts are equal.
 fn image() -> Vec<u8> {
     (0..8_192u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
 }
@@ -19,7 +19,7 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// Just powered.
+    /// After power-on.
     pub fn cold() -> Self {
         let simulation = standing();
         let chip = Bmi270::new(&simulation.world, &simulation.clock, 1, 1.0, &image());
@@ -27,7 +27,7 @@ impl Chip {
         Self { simulation, port, attached }
     }
 
-    /// After the start-up, on SPI.
+    /// After start-up, on SPI.
     fn started() -> Self {
         let mut chip = Self::cold();
         chip.wait(2_000);
@@ -46,7 +46,7 @@ impl Chip {
         chip
     }
 
-    /// Everything at 1600 Hz, ±8 g and ±2000 °/s, with both sensors in the FIFO.
+    /// All sensors at 1600 Hz, ±8 g and ±2000 °/s, both in the FIFO.
     pub fn running() -> Self {
         let mut chip = Self::initialised();
         for (register, value) in [(0x40, 0xAC), (0x41, 2), (0x42, 0xAC), (0x43, 0), (0x49, 0xD0), (0x7D, 0x0E)] {
@@ -108,7 +108,7 @@ fn the_first_transfer_only_chooses_spi() {
     chip.wait(2_000);
     assert_ne!(chip.read(0), [0x24]);
     assert_eq!(chip.read(0), [0x24]);
-    // One byte too early is the byte without meaning.
+    // One byte earlier is the dummy byte.
     let mut bytes = [0x80, 0];
     chip.port.transfer_in_place(&mut bytes).unwrap();
     assert_eq!(bytes[1], 0);
@@ -131,13 +131,13 @@ fn registers_after_power_on() {
 
 #[test]
 fn the_upload_needs_power_order_and_every_byte() {
-    // In advanced power save nothing arrives.
+    // In advanced power save the upload is ignored.
     let mut chip = Chip::started();
     chip.upload();
     chip.wait(150_000);
     assert_eq!(chip.read(0x21), [0]);
 
-    // The right way, and the result takes a while.
+    // Correct sequence: the result takes some time.
     chip.write(0x7C, 0);
     chip.wait(450);
     chip.upload();
@@ -145,7 +145,7 @@ fn the_upload_needs_power_order_and_every_byte() {
     chip.wait(20_000);
     assert_eq!(chip.read(0x21), [1]);
 
-    // Without addresses every burst lands on the first.
+    // Without addresses every burst overwrites the first.
     chip.write(0x59, 0);
     chip.wait(2);
     for bytes in image().chunks(256) {
@@ -262,7 +262,7 @@ fn a_full_fifo_gives_up_the_oldest_and_says_so() {
     let bytes = chip.read_fifo(15);
     assert_eq!((bytes[0], bytes[2]), (0x40, 0x8C));
     assert!(bytes[1] > 100, "{} lost", bytes[1]);
-    // Stop when full keeps the oldest instead.
+    // In stop-on-full mode the oldest frames are kept.
     chip.write(0x48, 1);
     chip.wait(2);
     chip.write(0x7E, 0xB0);
@@ -296,7 +296,7 @@ fn a_soft_reset_forgets_everything_and_returns_to_i2c() {
     assert_ne!(chip.read(0), [0x24], "lost");
     assert_eq!(chip.read(0), [0x24]);
     assert_eq!((chip.read(0x21), chip.read(0x7C), chip.fifo_length()), ([0], [3, 0], 0));
-    // The same by a dip of the supply in flight.
+    // The same after a dip of the supply.
     let mut chip = Chip::running();
     chip.attached.reset();
     chip.wait(5_000);
@@ -304,7 +304,7 @@ fn a_soft_reset_forgets_everything_and_returns_to_i2c() {
     assert_eq!((chip.read(0x0C), chip.read(0x21)), ([0; 12], [0]));
 }
 
-/// Mean of 40 samples of the accelerometer, g, after the 50 ms a self test takes to arrive.
+/// Mean of 40 accelerometer samples, g, after the 50 ms that a self-test needs.
 fn accel_at_16_g(chip: &mut Chip, self_test: u8, pause: u64) -> [f64; 3] {
     chip.write(0x6D, self_test);
     chip.wait(pause);
@@ -335,7 +335,7 @@ fn the_self_test_moves_the_mass_both_ways_along_every_axis() {
     assert!(passes(right), "{right:?}");
     assert!(!passes(difference(3, 0x08, 50_000, true)), "nothing moves");
     assert!(!passes(difference(3, 0x00, 50_000, false)), "the small amplitude");
-    // At ±8 g half of the counts are of half the size, and the ends are cut off.
+    // At ±8 g a count is half as large, and the extremes saturate.
     assert!(!passes(difference(2, 0x08, 50_000, false).map(|g| g / 2.0)), "beyond the range");
     assert!(!passes(difference(3, 0x08, 2_000, false)), "too early");
 }
@@ -367,7 +367,7 @@ fn the_gyroscope_tests_itself_on_command() {
         chip.write(0x2F, 0);
         chip.wait(2);
         assert_eq!(chip.read(0x38), [0], "carried out");
-        // Not announced, the gyroscope on, retrimming, given up, in bursts.
+        // Not announced, gyroscope on, retrimming, aborted, in bursts.
         for (place, other) in [(0, (0x69, 0)), (1, (0x7D, 0x06)), (4, (0x33, 1)), (4, (0x33, 2)), (3, (0x32, 8))] {
             let mut wrong = preparation;
             wrong[place] = other;
@@ -418,7 +418,7 @@ fn over_i2c_it_answers_without_a_byte_of_no_meaning() {
 fn a_read_that_a_sample_falls_into_sees_one_of_the_two() {
     let mut chip = Chip::running();
     chip.wait(100_000);
-    // At 8 MHz the data take 14 µs; every so often a sample comes in their middle.
+    // At 8 MHz the data take 14 µs; occasionally a sample falls into the read.
     let (mut before, mut changes) = ([0; 12], 0);
     for _ in 0..4_000 {
         let data: [u8; 12] = chip.read(0x0C);

@@ -10,7 +10,7 @@ use stampfly_sim::chips::{Attached, Bmm150, I2cBus, SpiBus, SpiPort};
 
 const ADDRESS: u8 = 0x10;
 
-/// A chip that has been powered but not woken.
+/// A powered chip in suspend.
 fn chip() -> (Simulation, I2cBus, Attached) {
     let simulation = standing();
     let bus = I2cBus::new(&simulation.clock, 1);
@@ -54,7 +54,7 @@ fn a_forced_conversion_takes_its_time_and_ends_in_sleep() {
     write(&mut bus, 0x51, 4);
     write(&mut bus, 0x52, 14);
     write(&mut bus, 0x4C, 0x02);
-    // 145 µs · 9 + 500 µs · 15 + 980 µs = 9.8 ms, within two per cent.
+    // 145 µs · 9 + 500 µs · 15 + 980 µs = 9.8 ms, within 2 %.
     wait(&simulation, 9_000);
     assert_eq!(read(&mut bus, 0x48).map(|byte| byte & 1), [0]);
     wait(&simulation, 1_000);
@@ -82,10 +82,10 @@ fn normal_mode_measures_the_field_at_its_rate() {
             sum.iter_mut().zip(compensate(&trim, &data)).for_each(|(sum, value)| *sum += value);
         }
     }
-    // 8 s at 25 Hz by the chip's clock.
+    // 8 s at 25 Hz of the chip's clock.
     assert!((195..=205).contains(&fresh), "{fresh}");
     let mean = sum.map(|sum| sum / f64::from(fresh));
-    // What the model of the same specimen says, which is a body of (−y, x, z).
+    // The model of the same specimen; body is (−y, x, z) of the chip.
     let hard_iron = simulation.sensors.mag.hard_iron();
     let expected = [-4.3 + hard_iron.y, -30.8 - hard_iron.x, 36.4 + hard_iron.z].map(f64::from);
     for (axis, (mean, expected)) in mean.iter().zip(expected).enumerate() {
@@ -131,7 +131,7 @@ fn the_self_test_marks_the_axes_and_clears_its_bit() {
         let data: [u8; 5] = read(&mut bus, 0x42);
         assert_eq!([0, 2, 4].map(|place| data[place] & 1), [u8::from(!broken); 3]);
     }
-    // Only asleep.
+    // Only in sleep mode.
     let (simulation, mut bus) = awake();
     write(&mut bus, 0x4C, 0x01);
     wait(&simulation, 2_000);
@@ -146,7 +146,7 @@ fn the_advanced_self_test_turns_its_field_round() {
         write(&mut bus, 0x4B, 1);
         wait(&simulation, 3_000);
         let trim = read(&mut bus, 0x5D);
-        // Only z, five repetitions: within the four milliseconds that the maker's code waits.
+        // Only z, five repetitions: within the 4 ms for which the manufacturer's code waits.
         write(&mut bus, 0x4E, 0x1F);
         write(&mut bus, 0x52, 4);
         let [positive, negative] = [0xC2, 0x82].map(|mode| {
@@ -178,7 +178,7 @@ fn a_read_during_a_conversion_gives_the_one_before() {
     assert!(second[6] & 1 == 1 && second[..6] != first[..6]);
 }
 
-/// A transfer on SPI: these bytes out, then so many in.
+/// An SPI transfer: bytes written, then number of bytes read.
 fn transfer<const N: usize>(port: &mut SpiPort<Bmm150>, out: &[u8]) -> [u8; N] {
     let mut bytes = [0; N];
     port.transaction(&mut [Operation::Write(out), Operation::Read(&mut bytes)]).unwrap();

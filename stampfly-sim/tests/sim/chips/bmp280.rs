@@ -1,5 +1,5 @@
-//! BMP280 after BST-BMP280-DS001, with the integer compensation of its section 3.11.3 where the emulator inverts the
-//! floating-point one of section 8.1.
+//! BMP280 after BST-BMP280-DS001, with the integer compensation of section 3.11.3; the emulator
+//! inverts the floating-point one of section 8.1.
 
 use super::wait;
 use crate::compensation::bmp280 as compensate;
@@ -86,7 +86,7 @@ fn normal_mode_converts_at_its_rate_and_follows_the_world() {
         }
         before = data;
     }
-    // 13.5 ms of conversion and 62.5 ms of standby, within two per cent; each poll takes 1.2 ms.
+    // 13.5 ms of conversion and 62.5 ms of standby, within 2 %; each poll takes 1.2 ms.
     assert!((143..=166).contains(&changes), "{changes} in 12.1 s");
     let mean = sum / f64::from(changes);
     assert!((mean - 101_000.0).abs() < 250.0, "{mean}");
@@ -153,7 +153,7 @@ fn a_quantity_that_is_not_measured_keeps_its_mark() {
     assert_ne!(data[3..], [0x80, 0, 0]);
 }
 
-/// A transfer on SPI: these bytes out, then so many in.
+/// An SPI transfer: bytes written, then number of bytes read.
 fn transfer<const N: usize>(port: &mut SpiPort<Bmp280>, out: &[u8]) -> [u8; N] {
     let mut bytes = [0; N];
     port.transaction(&mut [Operation::Write(out), Operation::Read(&mut bytes)]).unwrap();

@@ -1,4 +1,4 @@
-//! The buses: what a transfer costs, who may use them, and every fault.
+//! Buses: transfer times, sharing, and all faults.
 
 use crate::standing;
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource, Operation};
@@ -34,7 +34,7 @@ fn both_traits_cost_the_bits_of_the_transfer() {
     assert_eq!(clock.now(), Instant::from_micros(615));
     embedded_hal::i2c::I2c::write_read(&mut bus, ADDRESS, &[0x88], &mut data).unwrap();
     assert_eq!(clock.now(), Instant::from_micros(1_230));
-    // Two writes in a row are one: no second start.
+    // Consecutive writes are joined without a second start.
     let mut operations = [Operation::Write(&[0xF5]), Operation::Write(&[0])];
     embedded_hal::i2c::I2c::transaction(&mut bus, ADDRESS, &mut operations).unwrap();
     assert_eq!(clock.now(), Instant::from_micros(1_230 + 73));
@@ -126,7 +126,7 @@ fn refusals_and_bit_errors_come_at_their_rate_and_repeat_with_the_seed() {
     let answers = run(5);
     let refused = answers.iter().filter(|answer| answer.is_err()).count();
     assert!((420..580).contains(&refused), "{refused}");
-    // Sixteen bits that matter: an error in about 15 of 100.
+    // Sixteen bits matter: an error in about 15 of 100 transfers.
     let wrong = answers.iter().flatten().filter(|id| **id != 0x58).count();
     assert!((160..290).contains(&wrong), "{wrong}");
     assert_eq!(answers, run(5));
@@ -173,7 +173,7 @@ fn a_dropped_transfer_occupies_the_line_and_changes_nothing() {
     assert_eq!((config, clock.now().since(start)), ([0], Duration::from_micros(73 + 98)));
 }
 
-/// A chip that answers the byte before and notes when.
+/// A chip that answers the previous byte and records the instant.
 #[derive(Debug, Default)]
 struct Echo {
     last: u8,
@@ -281,7 +281,7 @@ fn two_chips_share_the_spi_wires_one_after_the_other() {
     });
     tasks.run_until(Instant::from_millis(51));
     drop(tasks);
-    // The slow chip holds the wires for 43 µs; the first answer of the other one is the choice of SPI.
+    // The slow chip occupies the wires for 43 µs; the other chip's first transfer selects SPI.
     assert_eq!(ends.into_inner(), [(43, 0x49), (46, 0xFF), (49, 0x24)]);
 }
 

@@ -1,4 +1,4 @@
-//! A flow sensor whose chip select nobody drives spoils what the inertial sensor says.
+//! A flow sensor with an undriven chip select corrupts reads of the inertial sensor.
 
 use super::wait;
 use crate::standing;
@@ -16,7 +16,7 @@ fn board() -> (Simulation, SpiPort<Bmi270>, SpiPort<Pmw3901>) {
     (simulation, imu, flow)
 }
 
-/// How many of a hundred reads of the identity are right.
+/// Number of correct identity reads of a hundred.
 fn right(simulation: &Simulation, imu: &mut SpiPort<Bmi270>) -> usize {
     let mut read = || {
         wait(simulation, 100);

@@ -7,11 +7,11 @@ use embedded_hal_async::digital::Wait;
 use stampfly_sim::time::{Tasks, block_on};
 use stampfly_types::Duration;
 
-/// A period of the fastest rate, within the tolerance of the chip's clock, µs.
+/// Period of the highest rate, within the tolerance of the chip's clock, µs.
 const PERIOD: core::ops::RangeInclusive<u64> = 612..=638;
 const FRAME: u8 = 13;
 
-/// Running, with an empty FIFO and these settings of the pin, the latch and the map.
+/// A running chip with an empty FIFO and these settings of pin, latch and map.
 fn chip(pin: u8, latch: u8, map: u8, watermark: u8) -> Chip {
     let mut chip = Chip::running();
     for (register, value) in [(0x46, watermark), (0x47, 0), (0x53, pin), (0x55, latch), (0x58, map)] {
@@ -29,7 +29,7 @@ fn high(chip: &Chip) -> bool {
     chip.port.interrupt_pin().is_high().unwrap()
 }
 
-/// Waits with `waiting`, and says how long, µs.
+/// Waits with `waiting` and returns the duration, µs.
 fn timed(chip: &Chip, waiting: impl Future<Output = Result<(), core::convert::Infallible>>) -> u64 {
     let begun = chip.simulation.clock.now();
     block_on(&chip.simulation.clock, waiting).unwrap();
@@ -63,7 +63,7 @@ fn the_watermark_is_told_at_its_sample_and_taken_back_by_reading() {
     for _ in 0..50 {
         chip.read_fifo(usize::from(4 * FRAME));
         assert!(!high(&chip));
-        // Reading took some of the period.
+        // Reading has taken part of the period.
         let took = timed(&chip, pin.wait_for_rising_edge());
         assert!((4 * PERIOD.start() - 120..=4 * PERIOD.end()).contains(&took), "{took} µs");
     }
@@ -135,7 +135,7 @@ fn no_edge_is_missed_by_a_task_that_runs_late() {
     let mut context = core::task::Context::from_waker(core::task::Waker::noop());
     chip.wait(320);
     if edge.as_mut().poll(&mut context).is_pending() {
-        // Several pulses pass while somebody else holds the processor.
+        // Several pulses pass while another task blocks the processor.
         clock.advance_to(clock.now() + Duration::from_micros(2_000));
         assert!(edge.as_mut().poll(&mut context).is_ready());
     }

@@ -1,4 +1,4 @@
-//! Buses whose software takes its time.
+//! Buses with software latency.
 
 use super::wait;
 use crate::standing;
@@ -20,7 +20,7 @@ fn flow() -> (Simulation, SpiPort<Pmw3901>) {
     (simulation, port)
 }
 
-/// A burst's time, µs, and the third byte of it, which is the identity's register's when it is a read.
+/// Duration of a burst, µs, and its third byte, which is the identity when it is a read.
 fn burst(simulation: &Simulation, port: &mut SpiPort<Pmw3901>) -> (u64, u8) {
     let (begun, mut bytes) = (simulation.clock.now(), [0; 12]);
     let mut operations = [Operation::Write(&[0x00]), Operation::DelayNs(35_000), Operation::Read(&mut bytes)];
@@ -56,7 +56,7 @@ fn jitter_stays_within_its_bound_and_repeats() {
         (0..100).map(|_| burst(&simulation, &mut port).0).collect::<Vec<_>>()
     };
     let took = run();
-    // Three causes, of which each may last 30 µs longer.
+    // Three causes, each with up to 30 µs of jitter.
     assert!(took.iter().all(|took| (87 + 50..87 + 50 + 4 * 30).contains(took)), "{took:?}");
     assert!(took.iter().max() > took.iter().min().map(|least| least + 60).as_ref(), "{took:?}");
     assert_eq!(took, run());

@@ -1,4 +1,4 @@
-//! The emulated chips, asked byte by byte as their data sheets prescribe.
+//! Emulated chips, accessed byte by byte as their data sheets prescribe.
 #![allow(clippy::unusual_byte_groupings, reason = "digits are grouped as the fields of the register")]
 
 mod bmi270;
@@ -18,7 +18,7 @@ mod wire;
 use stampfly_sim::Simulation;
 use stampfly_types::Duration;
 
-/// Lets time pass.
+/// Advances the clock.
 fn wait(simulation: &Simulation, microseconds: u64) {
     simulation.clock.advance_to(simulation.clock.now() + Duration::from_micros(microseconds));
 }

@@ -22,7 +22,7 @@ impl Chip {
         Self { simulation, port, attached }
     }
 
-    /// Awake for so long, at ±16 g and ±2000 °/s.
+    /// Awake for this duration, at ±16 g and ±2000 °/s.
     fn awake(micros: u64) -> Self {
         let mut chip = Self::cold();
         chip.write(0x6B, 0x03);
@@ -73,13 +73,13 @@ fn what_a_known_program_calls_a_reset_resets_nothing() {
     chip.write(0x1A, 0x02);
     chip.write(0x6B, 0x08);
     assert_eq!([0x6B, 0x1A, 0x1B, 0x1C].map(|register| chip.byte(register)), [0x08, 0x02, 0x18, 0x18]);
-    // It switches the thermometer off.
+    // It switches the temperature sensor off.
     wait(&chip.simulation, 10_000);
     let [.., before, _, _, _] = chip.burst();
     wait(&chip.simulation, 1_000_000);
     let [.., after, _, _, _] = chip.burst();
     assert_eq!(before, after);
-    // And it wakes a chip that slept.
+    // It also wakes a sleeping chip.
     let mut chip = Chip::cold();
     chip.write(0x6B, 0x08);
     wait(&chip.simulation, 50_000);
@@ -96,7 +96,7 @@ fn ranges_scale_the_counts() {
         let share = f64::from(z) / g;
         assert!((share - 1.0).abs() < 0.13, "level and still, but for offset and scale: {share}");
     }
-    // The gyroscope's offset, with the noise of one sample.
+    // The gyroscope's offset plus the noise of one sample.
     let mut rates = [0.0; 2];
     for (rate, (range, counts)) in rates.iter_mut().zip([(0x00, 131.0), (0x18, 16.4)]) {
         chip.write(0x1B, range);
@@ -109,7 +109,7 @@ fn ranges_scale_the_counts() {
     assert!((f64::from(temperature) / 340.0 + 36.53 - 25.0).abs() < 1.0);
 }
 
-/// How often accelerometer and gyroscope change in a second of reads at 8 kHz.
+/// Number of changes of accelerometer and gyroscope in one second of reads at 8 kHz.
 fn changes(chip: &mut Chip) -> [u32; 2] {
     chip.port.set_frequency(20_000_000);
     let mut changes = [0; 2];
@@ -131,10 +131,10 @@ fn changes(chip: &mut Chip) -> [u32; 2] {
 fn the_gyroscope_has_8_khz_and_the_accelerometer_1_khz_which_the_registers_repeat() {
     let mut chip = Chip::awake(100_000);
     let [accel, gyro] = changes(&mut chip);
-    // The clock is good to 1 %, and now and then two samples are the same.
+    // The clock has a tolerance of 1 %, and occasionally two samples are equal.
     assert!((950..=1_010).contains(&accel), "{accel}");
     assert!((6_000..=8_080).contains(&gyro), "{gyro}");
-    // With any other filter, both 1 kHz; with a divider, less.
+    // With any other filter both have 1 kHz; with a divider less.
     chip.write(0x1A, 0x01);
     let [accel, gyro] = changes(&mut chip);
     assert!(accel <= 1_010 && (900..=1_010).contains(&gyro), "{accel} {gyro}");
@@ -160,7 +160,7 @@ fn the_filter_takes_noise_away() {
         (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 400.0).sqrt()
     };
     let (open, narrow) = (spread(0), spread(6));
-    // 0.005 °/s/√Hz over 256 Hz and the slope of a first order are 0.1 °/s, 13 counts.
+    // 0.005 °/s/√Hz over 256 Hz with a first-order slope is 0.1 °/s, 13 counts.
     assert!((9.0..18.0).contains(&open) && narrow < open / 4.0, "{open} {narrow}");
 }
 
@@ -203,7 +203,7 @@ fn the_self_test_answers_as_the_factory_has_measured_unless_it_is_broken() {
         }
         wait(&chip.simulation, 50_000);
         let with = chip.burst();
-        // The specimen's codes are 14 of the accelerometer's x and 12 of the gyroscope's.
+        // Trim codes of the specimen: 14 for the accelerometer's x, 12 for the gyroscope's.
         let [accel, gyro] = [0, 4].map(|place| f64::from(with[place]) - f64::from(without[place]));
         let expected = [4096.0 * 0.34 * (0.92_f64 / 0.34).powf(13.0 / 30.0), 25.0 * 131.0 * 1.046_f64.powi(11)];
         let near = |value: f64, expected: f64| (value / expected - 1.03).abs() < 0.05;

@@ -29,7 +29,7 @@ impl Radio {
         self.clock.advance_to(self.clock.now() + Duration::from_micros(micros));
     }
 
-    /// Sends a command with data; gives the status and what is read.
+    /// Sends a command with data; returns the status and the bytes read.
     fn ask<const N: usize>(&mut self, command: u8, data: [u8; N]) -> (u8, [u8; N]) {
         let mut bytes = vec![command];
         bytes.extend(data);
@@ -45,7 +45,7 @@ impl Radio {
         self.ask(register, [0]).1[0]
     }
 
-    /// As a receiver of ten bytes of plain ShockBurst on this channel, in standby.
+    /// A receiver of ten bytes of plain ShockBurst on this channel, in standby.
     fn set_up(&mut self, channel: u8, config: u8) {
         for (register, value) in [(0x01, 0), (0x02, 1), (0x04, 0), (0x05, channel), (0x06, 0x06), (0x11, 10)] {
             self.write(register, value);
@@ -77,7 +77,7 @@ fn bench() -> (Clock, Air, Radio) {
     (clock, air, radio)
 }
 
-/// A receiver on channel 40 that has settled.
+/// A settled receiver on channel 40.
 fn listening() -> (Clock, Air, Radio) {
     let (clock, air, mut radio) = bench();
     radio.set_up(40, 0x0F);
@@ -105,7 +105,7 @@ fn registers_read_after_power_on_as_the_table_says() {
     assert_eq!(radio.ask(0x0B, [0; 5]).1, [0xC2; 5]);
     assert_eq!(radio.ask(0x10, [0; 5]).1, [0xE7; 5]);
     assert_eq!([0x0C, 0x0D, 0x0E, 0x0F].map(|register| radio.read(register)), [0xC3, 0xC4, 0xC5, 0xC6]);
-    // Written from the lowest byte on; what is not written stays.
+    // Written from the least significant byte on; bytes not written are kept.
     radio.ask(0x2A, [9, 8]);
     assert_eq!(radio.ask(0x0A, [0; 5]).1, [9, 8, 0xE7, 0xE7, 0xE7]);
     radio.write(0x03, 0xFF);
@@ -201,7 +201,7 @@ fn a_wrong_bit_is_refused_by_the_sum_and_by_nothing_else() {
         radio.wait(air.send(&PACKET).as_micros());
     }
     assert!(!radio.is_interrupting());
-    // Without a sum, all are taken whose address is right.
+    // Without a CRC all packets with a matching address are accepted.
     let (_, air, mut radio) = bench();
     radio.set_up(40, 0x03);
     radio.high();
@@ -229,7 +229,7 @@ fn jammed_channels_and_packets_at_the_same_time_are_not_heard() {
     radio.wait(100);
     radio.wait(air.send(&PACKET).as_micros());
     assert!(!radio.is_interrupting());
-    // On another channel it does not matter.
+    // On another channel it has no effect.
     air.send(&AirPacket { channel: 41, ..PACKET });
     radio.wait(air.send(&PACKET).as_micros());
     assert!(radio.is_interrupting());
@@ -293,7 +293,7 @@ fn with_ce_high_everything_goes_out_at_once() {
     assert_eq!((sender.read(0x17) & 0x30, receiver.read(0x17)), (0x10, 0x12));
 }
 
-/// Two radios that acknowledge, as after a reset but for the rate.
+/// Two radios with acknowledgement, as after a reset except for the rate.
 fn acknowledging() -> (Air, Radio, Radio) {
     let (clock, air, mut receiver) = bench();
     let mut sender = Radio::of(&clock, Nrf24l01::new(&air));
@@ -316,10 +316,10 @@ fn what_is_acknowledged_is_sent_once_and_what_is_not_three_times_more() {
     sender.high();
     sender.wait(20);
     sender.low();
-    // Packet 153 bits, 130 µs to turn around, acknowledgement 73 bits.
+    // Packet 153 bits, 130 µs turnaround, acknowledgement 73 bits.
     sender.wait(130 + 153 + 130 + 73 - 20);
     assert_eq!((sender.read(0x07), receiver.ask(0x61, [0; 10]).1), (0x2E, PAYLOAD));
-    // Nobody there: 1 + 3 attempts, 250 µs from the end of one to the next.
+    // No receiver: 1 + 3 attempts, 250 µs from the end of one to the next.
     receiver.low();
     sender.write(0x07, 0x70);
     sender.ask(0xA0, PAYLOAD);
@@ -328,7 +328,7 @@ fn what_is_acknowledged_is_sent_once_and_what_is_not_three_times_more() {
     assert_eq!(sender.read(0x07), 0x0E);
     sender.wait(10);
     assert_eq!((sender.read(0x07), sender.read(0x17)), (0x1E, 0x01), "given up; the payload stays");
-    // A packet whose acknowledgement is lost comes again and is not stored twice.
+    // A packet whose acknowledgement was lost is repeated and not stored twice.
     sender.low();
     sender.ask(0xE1, []);
     sender.write(0x07, 0x70);

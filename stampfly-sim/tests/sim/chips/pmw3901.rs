@@ -7,7 +7,8 @@ use stampfly_sim::chips::{Attached, Pmw3901, SpiBus, SpiPort};
 use stampfly_sim::plant::{PlantParameters, Pose, WindConfig};
 use stampfly_sim::{Simulation, SimulationConfig};
 
-/// The performance settings: register and value, in their order, beginning with those made of the chip's calibration.
+/// Performance settings: register and value in order, beginning with those derived from the chip's
+/// calibration.
 #[rustfmt::skip]
 const LIST: &[u16] = &[
     0x7F00, 0x61AD, 0x5170, 0x7F0E, 0x7028, 0x712B,
@@ -26,7 +27,7 @@ struct Chip {
 }
 
 impl Chip {
-    /// Just powered, without weight, moving at this velocity over the floor.
+    /// After power-on, weightless, moving over the floor at this velocity.
     fn cold(height: f64, velocity: [f64; 3]) -> Self {
         let plant = PlantParameters { gravity: 0.0, drag_quadratic: 0.0, ..PlantParameters::EXAMPLE };
         let mut pose = Pose { rotors: 0.0, ..Pose::hovering(height) };
@@ -49,7 +50,7 @@ impl Chip {
         chip
     }
 
-    /// Writes the list, with its pause.
+    /// Writes the list with its pause.
     fn tune(&mut self, list: &[u16]) {
         for entry in list {
             if *entry == 0x3244 {
@@ -59,12 +60,12 @@ impl Chip {
         }
     }
 
-    /// Writes register and value, and waits as long as prescribed.
+    /// Writes register and value, and waits as prescribed.
     fn write(&mut self, entry: u16) {
         self.write_holding(entry, 35_000);
     }
 
-    /// The chip select stays low for so long after the last clock, ns.
+    /// As above, with the chip select low for `hold` ns after the last clock.
     fn write_holding(&mut self, entry: u16, hold: u32) {
         let [register, value] = entry.to_be_bytes();
         let mut operations = [Operation::Write(&[register | 0x80, value]), Operation::DelayNs(hold)];
@@ -153,7 +154,7 @@ fn without_the_list_it_is_blind() {
 
 #[test]
 fn the_burst_counts_motion_in_the_chips_axes() {
-    // Per second and axis: velocity over height, in counts of 2.22 mrad.
+    // Per second and axis: velocity divided by height, in counts of 2.22 mrad.
     for (velocity, expected) in [([0.5, 0.0, 0.0], [0.0, -225.2]), ([0.0, 0.5, 0.0], [225.2, 0.0])] {
         let mut chip = Chip::tuned(1.0, velocity);
         chip.burst();
@@ -207,15 +208,15 @@ fn the_list_counts_in_its_order_only() {
         chip.burst()[6] > 0
     };
     assert!(sees(LIST));
-    // Of these there are two sets of values.
+    // Two sets of values exist for these entries.
     let disputed = |entry: &u16| [0x6567, 0x6370, 0x4848].contains(entry);
     for place in (0..LIST.len()).filter(|place| !disputed(&LIST[*place])) {
         let mut missing = LIST.to_vec();
         let entry = missing.remove(place);
-        // Those that select the bank that is selected already.
+        // Writes that select the bank already selected.
         let repeats = place == 0 || LIST[place - 1] == 0x3244;
         assert_eq!(sees(&missing), repeats, "without {entry:#06x}");
-        // After 0x3244 comes the bank that it is in.
+        // After 0x3244 the list selects the present bank.
         if entry >> 8 != 0x7F && entry != 0x3244 && LIST.get(place + 1).is_some_and(|next| !disputed(next)) {
             let mut late = LIST.to_vec();
             late.swap(place, place + 1);

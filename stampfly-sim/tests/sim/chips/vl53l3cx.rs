@@ -18,7 +18,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// A chip that has had its supply for two milliseconds.
+    /// A chip 2 ms after power-on.
     fn new() -> Self {
         let simulation = standing();
         let bus = I2cBus::new(&simulation.clock, 1);
@@ -43,7 +43,7 @@ impl Bench {
         self.bus.write(FIRST, &message).unwrap();
     }
 
-    /// Long distance, 33 ms, a measurement every 40 ms by the chip's own oscillator.
+    /// Long distance, 33 ms, one measurement every 40 ms of the chip's oscillator.
     fn start(&mut self) {
         let missing = i16::from_be_bytes(self.read(0x0022));
         self.write(0x001E, &missing.wrapping_mul(4).to_be_bytes());
@@ -55,7 +55,7 @@ impl Bench {
         self.write(0x0087, &[0x40]);
     }
 
-    /// Is the interrupt line asserted? Active low after a reset.
+    /// True if the interrupt line is asserted, which is active low after a reset.
     fn is_ready(&mut self) -> bool {
         let ([polarity], [line]): ([u8; 1], [u8; 1]) = (self.read(0x0030), self.read(0x0031));
         (line & 1 == 0) == (polarity & 0x10 != 0)
@@ -165,7 +165,7 @@ fn two_that_are_awake_at_once_move_together() {
     bench.write(0x0001, &[0x30]);
     assert_eq!([&bench.chip, &front].map(|chip| chip.peek(0x0001)), [0x30; 2]);
     assert!(bench.try_read::<1>(FIRST, 0x010F).is_err(), "nobody stayed");
-    // In reset it keeps out of it.
+    // In reset it ignores bus traffic.
     let Ok(()) = shutdown.set_low();
     bench.bus.write(0x30, &[0x00, 0x01, 0x31]).unwrap();
     let Ok(()) = shutdown.set_high();
@@ -210,7 +210,7 @@ fn an_xshut_that_rises_in_the_middle_of_a_transfer_leaves_the_chip_mute_until_it
     assert_eq!(bench.read(0x010F), [0xEA]);
 }
 
-/// Sends what a histogram wants, which also takes note of the one before.
+/// Sends the settings of a histogram, which also clears the interrupt of the previous one.
 fn shoot(bench: &mut Bench, group: u8) {
     bench.write(0x0024, &[0x14, 0x00]);
     bench.write(0x0034, &[0x08]);
@@ -233,13 +233,14 @@ fn a_histogram_is_measured_for_each_start_and_tells_which() {
         let took = bench.simulation.clock.now().since(begun).seconds();
         let [interrupt, status, _, number]: [u8; 4] = bench.read(0x0088);
         told.push((interrupt >> 4, status & 0x1F, number));
-        // Six times 85 or 36 macro periods of 61 and 73 µs, 1.7 ms, and what the settings take.
+        // Six times 85 or 36 macro periods of 61 and 73 µs, plus 1.7 ms and the time to send the
+        // settings.
         let expected = if number & 1 == 0 { 0.0328 } else { 0.0175 };
         assert!((took - expected).abs() < 0.0035, "{took} s for number {number}");
         wait(&bench.simulation, 100_000);
         assert_eq!(bench.read(0x008B), [number], "no other without a start");
     }
-    // Of the settings before the last, but for the first.
+    // By the settings sent before the last, except for the first.
     assert_eq!(told[..4], [(2, 18, 0), (2, 9, 0), (0, 9, 1), (2, 9, 2)]);
     assert_eq!((told[256].2, told[257].2, told[258].2), (255, 128, 129));
     bench.write(0x0087, &[0]);
@@ -271,7 +272,7 @@ fn a_histogram_has_ambient_light_first_and_a_pulse_where_the_reference_says() {
     let pulse: Vec<_> = bins[4..].iter().map(|bin| f64::from(bin.saturating_sub(ambient + ambient / 2))).collect();
     let total: f64 = pulse.iter().sum();
     let centre = pulse.iter().enumerate().map(|(place, bin)| (place as f64 + 0.5) * bin).sum::<f64>() / total;
-    // It stands 30 mm above the floor: 0.15 bins, and some millimetres of its own.
+    // Standing 30 mm above the floor: 0.15 bins, plus the specimen's offset.
     assert!((centre - zero - 0.15).abs() < 0.12, "{centre} {zero}");
     let wide = pulse.iter().filter(|bin| **bin > total / 100.0).count();
     assert!((3..=5).contains(&wide), "a pulse of 2.5 bins: {pulse:?}");

@@ -1,4 +1,5 @@
-//! SPI at the level of edges: what a chip gets when the clock's level, the mode or the order of bits is not what it wants.
+//! SPI at edge level: bytes that a chip receives with the wrong idle level, clock mode or bit
+//! order.
 
 use super::wait;
 use crate::standing;
@@ -13,7 +14,7 @@ use stampfly_sim::time::Clock;
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// A chip that notes the bytes it was given since its select fell, and answers the number of each.
+/// A chip that records the bytes received since its select fell, and answers their numbers.
 #[derive(Debug, Default)]
 struct Notes(Rc<RefCell<Vec<u8>>>);
 
@@ -41,7 +42,7 @@ impl SpiChip for Notes {
     fn release(&mut self, _: Instant) {}
 }
 
-/// Two of them on one bus, each in its mode; and the notes of the second.
+/// Two such chips on one bus with different modes, and the record of the second.
 fn two(controller: Controller, modes: [Mode; 2]) -> (SpiPort<Notes>, SpiPort<Notes>, Rc<RefCell<Vec<u8>>>) {
     let bus = SpiBus::new(&Clock::new(Instant::ZERO), 1);
     bus.set_controller(controller);
@@ -61,11 +62,12 @@ fn after_a_device_that_idles_low_the_next_sees_an_edge_more_than_bits_and_every_
         let mut bytes = [0b1010_0101, 0b0011_1100, 0b1111_0000];
         high.transfer_in_place(&mut bytes).unwrap();
         assert_eq!(high.rising_edges() - edges, 25, "esp-idf#12543: one more than 3 times 8");
-        // MOSI as the transfer before it left the line, then the bits; the last bit is no whole byte.
+        // MOSI at the level left by the previous transfer, then the bits; the last bit is an
+        // incomplete byte.
         assert_eq!(*notes.borrow(), [bit << 7 | 0b0101_0010, 0b1001_1110, 0b0111_1000]);
-        // MISO is a bit ahead: the second bit of its first byte is the first that is read.
+        // MISO is one bit ahead: the second bit of its first byte is read first.
         assert_eq!(bytes, [0b0000_0001, 0b0000_0011, 0b0000_0101]);
-        // The clock is where it should be from now on.
+        // From here on the clock has the correct level.
         high.write(&[0b1010_0101]).unwrap();
         assert_eq!(*notes.borrow(), [0b1010_0101]);
     }
@@ -104,7 +106,7 @@ fn a_transfer_without_bytes_changes_no_level() {
     assert_eq!(*notes.borrow(), [0x7F], "the level is still low");
 }
 
-/// What a chip says when it is asked for its identity, and what it should say.
+/// Identity read from a chip, and the expected one.
 fn identities(mode: Mode, order: BitOrder) -> [(&'static str, u8, u8); 4] {
     let simulation = standing();
     let (world, clock) = (&simulation.world, &simulation.clock);
@@ -117,7 +119,7 @@ fn identities(mode: Mode, order: BitOrder) -> [(&'static str, u8, u8); 4] {
     ) -> u8 {
         let mut port = port.with_mode(mode).with_order(order);
         let mut answer = [0];
-        // Twice: the first chooses SPI.
+        // Twice, because the first transfer selects SPI.
         for _ in 0..2 {
             let mut operations = [Operation::Write(ask), Operation::DelayNs(pause), Operation::Read(&mut answer)];
             port.transaction(&mut operations).unwrap();
@@ -132,12 +134,12 @@ fn identities(mode: Mode, order: BitOrder) -> [(&'static str, u8, u8); 4] {
     let (baro, _) = bus().attach(10_000_000, Bmp280::new(world, clock, 1));
     let (mut mag, _) = bus().attach(10_000_000, Bmm150::new(world, clock, 1));
     wait(&simulation, 50_000);
-    // It has an identity when it is no longer suspended.
+    // The identity is readable outside suspend only.
     mag.write(&[0x4B, 0x01]).unwrap();
     wait(&simulation, 5_000);
     let setup = (mode, order);
     [
-        // The inverse one: an address of zeros is the same one bit late.
+        // The inverted identity, because an address of zeros is the same when shifted by one bit.
         ("flow sensor", read(clock, flow, setup, &[0x5F], 35_000), 0xB6),
         ("inertial sensor", read(clock, imu, setup, &[0x80, 0], 0), 0x24),
         ("barometer", read(clock, baro, setup, &[0xD0], 0), 0x58),
@@ -172,7 +174,7 @@ fn with_the_least_bit_first_no_chip_has_its_identity() {
     }
 }
 
-/// The flow sensor's identity in the first transfer of all.
+/// The flow sensor's identity, read in the very first transfer.
 fn first_identity(controller: Controller, begins_with_nobody: bool) -> u8 {
     let simulation = standing();
     let bus = SpiBus::new(&simulation.clock, 1);
@@ -194,7 +196,7 @@ fn the_first_transfer_after_reset_is_wrong_on_an_esp32_s3_unless_a_byte_to_nobod
     assert_eq!(first_identity(Controller::LevelFirst, false), 0x49);
 }
 
-/// A chip that answers what time it is and was when it took a byte.
+/// A chip that answers the instants of the present and the previous byte.
 #[derive(Debug, Default)]
 struct Watch(u64);
 
@@ -222,7 +224,7 @@ impl SpiChip for Watch {
     }
 }
 
-/// A part of a transfer.
+/// Part of a transfer.
 #[derive(Clone, Debug)]
 enum Part {
     Read(usize),
@@ -237,7 +239,7 @@ fn part() -> impl Strategy<Value = Part> {
     prop_oneof![
         (0..20usize).prop_map(Part::Read),
         bytes().prop_map(Part::Write),
-        // What the drivers ask: an address, or a register and its value.
+        // As drivers write: an address, or a register and its value.
         (0..2u8, 0..128u8, any::<u8>()).prop_map(|(read, register, value)| {
             Part::Write(if read == 1 { vec![register | 0x80] } else { vec![register, value] })
         }),
@@ -247,10 +249,10 @@ fn part() -> impl Strategy<Value = Part> {
     ]
 }
 
-/// A transfer: which chip, its parts, and the pause after it, µs.
+/// A transfer: chip, parts, and the pause after it, µs.
 type Asked = (usize, Vec<Part>, u64);
 
-/// What the bytes are that were read, when each transfer was over, and how many rising edges each chip saw.
+/// Bytes read, end of each transfer, and number of rising edges at each chip.
 fn played(
     transfers: &[Asked],
     (controller, modes): (Controller, [Mode; 4]),
@@ -343,7 +345,7 @@ proptest! {
         let bus = (Controller::LevelWithTransfer, [mode; 4]);
         let bytes = played(&transfers, bus, errors, false);
         prop_assert_eq!(&bytes, &played(&transfers, bus, errors, true));
-        // And the controller makes no difference.
+        // The kind of controller makes no difference.
         prop_assert_eq!(&bytes, &played(&transfers, (Controller::LevelFirst, [mode; 4]), errors, true));
     }
 

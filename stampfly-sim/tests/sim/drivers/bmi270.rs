@@ -1,4 +1,4 @@
-//! BMI270.
+//! Driver of the BMI270.
 
 use super::{Tap, hover, registers};
 use crate::{mounting, standing};
@@ -14,7 +14,7 @@ use stampfly_types::{Duration, Instant, Vec3};
 
 type Driver<'b> = Bmi270<'b, SpiRegisters<SpiPort<chips::Bmi270>>, Clock>;
 
-/// A chip that has just been powered, on SPI at 10 MHz. The seed decides how far off its clock is.
+/// A chip after power-on, on SPI at 10 MHz. The seed determines its clock error.
 pub fn soldered(simulation: &Simulation, seed: u64) -> (SpiPort<chips::Bmi270>, Attached) {
     let chip = chips::Bmi270::new(&simulation.world, &simulation.clock, seed, 1.0, &stand_in_image());
     SpiBus::new(&simulation.clock, 1).attach(10_000_000, chip)
@@ -24,7 +24,7 @@ fn driver<'b>(port: SpiPort<chips::Bmi270>, clock: &Clock, image: &'b [u8], conf
     Bmi270::spi(port, clock.clone(), image, mounting::IMU, config)
 }
 
-/// What a call takes.
+/// Duration of a call.
 fn timed<T>(clock: &Clock, call: impl Future<Output = T>) -> (Duration, T) {
     let begun = clock.now();
     let outcome = block_on(clock, call);
@@ -63,22 +63,23 @@ fn the_chip_is_told_what_the_configuration_says_in_the_promised_time() {
         assert!((Duration::from_millis(60)..Duration::from_millis(220)).contains(&took), "{took}");
         // Normal bandwidth and performance; low noise of the gyroscope.
         assert_eq!(registers(&attached, 0x40), [0xA0 | r, a, 0xE0 | r, g]);
-        // Filtered into the FIFO; headers, accelerometer and gyroscope, oldest given up, no time.
+        // FIFO: filtered data, headers, accelerometer and gyroscope, oldest dropped, no time.
         assert_eq!((attached.peek(0x45), registers(&attached, 0x48)), (0x88, [0x00, 0xD0]));
-        // No interrupt, power saving off, everything on.
+        // No interrupt, power save off, everything on.
         assert_eq!((attached.peek(0x53), attached.peek(0x58)), (0, 0));
         assert_eq!((attached.peek(0x7C) & 1, attached.peek(0x7D)), (0, 0x0E));
     }
 }
 
-/// Accelerometer and gyroscope along the chip's axes, counts, of a frame as the data sheet lays it out.
+/// Accelerometer and gyroscope of a frame along the chip's axes, counts, by the data sheet's
+/// layout.
 fn frame(bytes: &[u8]) -> [f64; 6] {
     assert_eq!(bytes[0], 0x8C);
     let word = |place: usize| f64::from(i16::from_le_bytes([bytes[1 + 2 * place], bytes[2 + 2 * place]]));
     [word(3), word(4), word(5), word(0), word(1), word(2)]
 }
 
-/// What seven consecutive frames mean, body axes, SI, at ±8 g and ±2000 °/s.
+/// The decimated value of seven consecutive frames, body axes, SI, at ±8 g and ±2000 °/s.
 fn decimated(frames: &[[f64; 6]]) -> (Vec3, Vec3) {
     let weights = [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0];
     let [x, y, z, p, q, r] = core::array::from_fn(|channel| {
@@ -134,7 +135,7 @@ fn samples_come_at_the_configured_rate_and_a_late_reader_gets_every_one() {
         let (mut before, mut late) = (None, 0.0);
         for number in 0..200 {
             if number % 50 == 49 {
-                // 80 ms at 400 Hz, more at the others.
+                // 80 ms at 400 Hz, more at the other rates.
                 late = 32.0 * period;
                 clock.advance_to(clock.now() + Duration::from_micros(late as u64));
             }
@@ -142,7 +143,8 @@ fn samples_come_at_the_configured_rate_and_a_late_reader_gets_every_one() {
             assert!((sample.data.accel.z + 9.81).abs() < 0.6 && sample.data.gyro.norm() < 0.05, "{sample:?}");
             if let Some(before) = before.replace(sample.at) {
                 let step = sample.at.since(before).as_micros() as f64;
-                // Two per cent of the chip's clock, two ticks, and what the clock is off while nobody looked.
+                // 2 % of the chip's clock, two ticks, and the clock error accumulated without
+                // polling.
                 let error = (step - period).abs();
                 assert!(
                     error < 0.02 * (period + late) + 80.0,
@@ -179,7 +181,7 @@ fn the_self_tests_tell_a_healthy_chip_from_a_broken_one() {
 #[test]
 fn over_i2c_it_measures_the_same() {
     let image = stand_in_image();
-    // Chips whose clocks are fast and slow, by up to two per cent.
+    // Chips with clocks up to 2 % fast and slow.
     for seed in 1..=12 {
         let simulation = standing();
         let clock = &simulation.clock;
@@ -192,7 +194,7 @@ fn over_i2c_it_measures_the_same() {
         let mean = samples[399].at.since(samples[0].at).as_micros() as f64 / 399.0;
         assert!((mean / 2_500.0 - 1.0).abs() < 0.025, "{mean} µs between samples");
         for (number, sample) in samples.iter().enumerate() {
-            // A tick, and the addresses on the bus.
+            // One tick, and the address bytes on the bus.
             let error = sample.at.as_micros() as f64 - samples[0].at.as_micros() as f64 - mean * number as f64;
             assert!(error.abs() < 2.0 * (40.0 + 40.0), "seed {seed}, sample {number}: {error} µs off the rhythm");
         }

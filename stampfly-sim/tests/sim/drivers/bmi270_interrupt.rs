@@ -1,4 +1,4 @@
-//! BMI270 with its interrupt pin, which may be right, silent or stuck.
+//! Driver of the BMI270 with its interrupt pin: correct, silent or stuck.
 
 use super::bmi270::soldered;
 use super::{Tap, registers};
@@ -15,17 +15,17 @@ use stampfly_sim::chips::{InterruptPin, stand_in_image};
 use stampfly_sim::time::Tasks;
 use stampfly_types::Instant;
 
-/// What may be wrong with the wire.
+/// Defect of the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wire {
     Right,
-    /// Torn: always low.
+    /// Broken: always low.
     Silent,
     /// Shorted to the supply: always high.
     Stuck,
 }
 
-/// The pin at the end of that wire. It breaks between two waits.
+/// The pin at the end of the wire, which fails between two waits.
 struct Pin<'w> {
     pin: InterruptPin,
     wire: &'w Cell<Wire>,
@@ -57,17 +57,17 @@ impl Wait for Pin<'_> {
     }
 }
 
-/// What came of two seconds.
+/// Results of two seconds.
 struct Run {
-    /// When samples were delivered, and for when.
+    /// Instants of delivery, and of the samples.
     samples: Vec<(Instant, Instant)>,
-    /// When the pin itself rose: the instants of every fourth sample in the chip.
+    /// Rising edges of the pin: the instants of every fourth sample in the chip.
     rises: Vec<Instant>,
-    /// How often the status was read, all in all.
+    /// Number of status reads.
     looks: usize,
 }
 
-/// A specimen whose wire is `before` for a second and `after` for another.
+/// A specimen whose wire is `before` for one second and `after` for another.
 fn run(seed: u64, before: Wire, after: Wire) -> Run {
     let simulation = standing();
     let (port, attached) = soldered(&simulation, seed);
@@ -102,7 +102,8 @@ fn run(seed: u64, before: Wire, after: Wire) -> Run {
     Run { samples: samples.into_inner(), rises: rises.into_inner(), looks }
 }
 
-/// The longest time from the last chip sample in a delivered one, which is three of them after its stamp, to delivery.
+/// Longest time from the last chip sample in a delivered one (three samples after its stamp) to the
+/// delivery.
 fn latest(samples: &[(Instant, Instant)]) -> u64 {
     samples.iter().map(|(seen, at)| seen.since(*at).as_micros().saturating_sub(3 * 625)).max().expect("samples")
 }
@@ -117,7 +118,7 @@ fn samples_come_by_the_pin_one_look_each() {
         let run = run(seed, Wire::Right, Wire::Right);
         assert!(run.samples.len() > 700, "{}", run.samples.len());
         assert!(run.looks <= run.samples.len() + 5, "{} looks for {} samples", run.looks, run.samples.len());
-        // Three ticks after the edge, and two transfers; three periods of a clock that may be slow by two per cent.
+        // Three ticks after the edge, and two transfers; three periods of a clock up to 2 % slow.
         assert!(latest(&run.samples) < 117 + 60 + 60 + 38, "seed {seed}: {} µs", latest(&run.samples));
         for (seen, at) in &run.samples {
             let rise = run.rises.iter().rev().find(|rise| *rise <= seen).expect("a rise before every sample");
@@ -136,7 +137,8 @@ fn a_pin_that_is_wrong_from_the_start_costs_a_few_late_samples() {
             let run = run(seed, wire, wire);
             assert!(run.samples.len() + 3 >= right, "{wire:?}: {} samples instead of {right}", run.samples.len());
             assert!(longest_gap(&run.samples) < 2_500 + 625, "{wire:?}: {} µs", longest_gap(&run.samples));
-            // By the driver's own clock: a look that came too early is followed by one a sample later.
+            // By the driver's own clock: a poll that came too early is followed by another one
+            // sample later.
             let settled = latest(&run.samples[20..]);
             assert!(settled < 625, "seed {seed}, {wire:?}: {settled} µs");
         }

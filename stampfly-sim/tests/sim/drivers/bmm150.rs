@@ -1,4 +1,4 @@
-//! BMM150.
+//! Driver of the BMM150.
 
 use super::registers;
 use crate::{compensation, mounting, standing};
@@ -64,7 +64,8 @@ fn the_field_is_that_of_the_registers_and_the_models() {
     }
     let mean = stamps[39].since(stamps[0]).seconds() / 39.0;
     assert!((mean / 0.04 - 1.0).abs() < 0.025, "{mean} s between samples");
-    // The chip keeps its rhythm and is seen within 2 ms and a read of 0.3 ms, as were the two that the mean is made of.
+    // The chip keeps its rate; samples are seen within 2 ms plus a read of 0.3 ms, and so are the
+    // two of which the mean is made.
     let late = (0u8..).zip(&stamps).map(|(n, at)| at.since(stamps[0]).seconds() - f32::from(n) * mean);
     let (least, most) = late.fold((0.0f32, 0.0f32), |(least, most), late| (least.min(late), most.max(late)));
     assert!(most - least < 2.0 * 0.0023, "{} s", most - least);

@@ -1,4 +1,4 @@
-//! BMP280.
+//! Driver of the BMP280.
 
 use super::registers;
 use crate::{compensation, standing};
@@ -47,11 +47,11 @@ fn pressure_and_temperature_are_those_of_the_registers() {
     for _ in 0..50 {
         let sample = block_on(clock, driver.next()).expect("a conversion");
         let (temperature, pressure) = compensation::bmp280(&registers(&attached, 0x88), &registers(&attached, 0xF7));
-        // 1/256 Pa and a hundredth of a degree.
+        // Resolution: 1/256 Pa and 0.01 °C.
         assert!((f64::from(sample.data.pressure) - pressure).abs() <= 1.0 / 256.0, "{sample:?} {pressure}");
         assert!((f64::from(sample.data.temperature) - temperature).abs() < 0.006, "{sample:?} {temperature}");
         assert!(before == Instant::ZERO || sample.at.since(before) == Duration::from_millis(40), "{}", sample.at);
-        // 13.5 ms of conversion, of which the pressure is the last 8.
+        // 13.5 ms of conversion, of which the last 8 ms are pressure.
         let age = clock.now().since(sample.at).as_micros();
         assert!((4_000..8_000).contains(&age), "{age} µs");
         before = sample.at;

@@ -1,8 +1,10 @@
-//! Drivers for I2C on a bus that it shares with a display: a kilobyte every few milliseconds, at 400 kHz or at 100.
+//! I²C drivers on a bus shared with a display: a kilobyte every few milliseconds, at 400 or 100
+//! kHz.
 //!
-//! Waiting for the bus is no fault of the chip, so no driver may give up because of it. An SSD1306 of 128 by 64 pixels gets 1025 bytes a
-//! frame: 23 ms at 400 kHz, 92 ms at 100 kHz. A BMI270 alone fills two thirds of the bus at 400 kHz, so it has a display that is drawn four times
-//! a second.
+//! Waiting for the bus is not a fault of the chip, so no driver may give up because of it. An
+//! SSD1306 of 128 by 64 pixels receives 1025 bytes per frame: 23 ms at 400 kHz, 92 ms at 100 kHz. A
+//! BMI270 alone uses two thirds of the bus at 400 kHz, so its display is drawn four times per
+//! second.
 
 use super::Display;
 use crate::{mounting, standing};
@@ -22,9 +24,9 @@ use stampfly_types::{Duration, Instant};
 
 const FRAME: [u8; 1_025] = [0x40; 1_025];
 const ADDRESS: u8 = 0x3C;
-/// From the end of a frame to the beginning of the next.
+/// Time from the end of a frame to the beginning of the next.
 const PAUSE: Duration = Duration::from_millis(10);
-/// At a quarter of the speed the display takes four times as many bytes' time.
+/// At a quarter of the speed the display takes four times as long per byte.
 const SPEEDS: [(&str, usize); 2] = [("400 kHz", 1), ("100 kHz", 4)];
 
 impl I2cChip for Display {
@@ -36,7 +38,8 @@ impl I2cChip for Display {
     }
 }
 
-/// What `call` makes of the bus beside a display, for three seconds: samples, and the kinds of errors.
+/// Runs `call` on the bus next to a display for three seconds: number of samples, and kinds of
+/// errors.
 fn beside_a_display(
     attach: impl Fn(&Simulation, &I2cBus),
     (frames, pause): (usize, Duration),
@@ -63,7 +66,7 @@ fn beside_a_display(
     seen.into_inner()
 }
 
-/// A driver that is asked for samples for ever.
+/// Requests samples from a driver endlessly.
 macro_rules! asked {
     (|$bus:ident, $clock:ident| $driver:expr) => {
         async |$bus: I2cBus, $clock: Clock, seen: &RefCell<Vec<Result<(), SensorErrorKind>>>| {
@@ -76,7 +79,7 @@ macro_rules! asked {
     };
 }
 
-/// All of them samples, and at least so many.
+/// Checks that there are no errors and at least this many samples.
 fn all_samples(name: &str, speed: &str, seen: &[Result<(), SensorErrorKind>], least: usize) {
     let errors: Vec<_> = seen.iter().filter(|outcome| outcome.is_err()).collect();
     assert!(errors.is_empty(), "{name} at {speed}: {} of {} fail: {:?}", errors.len(), seen.len(), errors[0]);
@@ -141,6 +144,6 @@ fn an_inertial_sensor_waits_and_catches_up() {
     let config = bmi270::Config::default();
     let driver = asked!(|bus, clock| Bmi270::i2c(bus, 0x68, clock, &image, mounting::IMU, config));
     let seen = beside_a_display(attach, (1, Duration::from_millis(227)), driver);
-    // 400 a second, but for half a second to start.
+    // 400 per second, minus half a second of start-up.
     all_samples("inertial sensor", "400 kHz", &seen, 950);
 }

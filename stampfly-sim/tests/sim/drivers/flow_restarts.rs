@@ -1,4 +1,5 @@
-//! A flow sensor whose start goes wrong: its task starts it again from the reset until it works, and the inertial sensor beside it does not notice.
+//! A flow sensor with failing starts: its task resets and restarts it until it works, without
+//! affecting the inertial sensor on the same bus.
 
 use crate::mounting;
 use core::cell::{Cell, RefCell};
@@ -13,10 +14,10 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::{Duration, Instant};
 
-/// What the chip says instead: the register, and its answer.
+/// A wrong answer of the chip: register and value.
 type Change = fn(u8, &mut [u8], u32);
 
-/// A device whose chip answers wrongly until it has been reset so many times.
+/// A device whose chip answers wrongly until a number of resets.
 struct Stubborn<'s, S> {
     device: S,
     resets: &'s Cell<u32>,
@@ -44,20 +45,20 @@ impl<S: SpiDevice> SpiDevice for Stubborn<'_, S> {
     }
 }
 
-/// How both did.
+/// Results of both sensors.
 #[derive(Debug)]
 struct Done {
     flow: SensorHealth,
     imu: SensorHealth,
     resets: u32,
-    /// When the first picture came.
+    /// Instant of the first picture.
     first: Option<Instant>,
-    /// When each inertial sample was valid and when it came.
+    /// Instants of validity and of delivery of each inertial sample.
     samples: Vec<(Instant, Instant)>,
     delays: u32,
 }
 
-/// A flow sensor like that beside an inertial sensor, as long as this; `act` may do something to it every 10 ms.
+/// Runs such a flow sensor next to an inertial sensor; `act` is called every 10 ms.
 fn beside(wrong_until: u32, change: Change, long: Duration, act: fn(&Attached, Instant)) -> Done {
     let config = SimulationConfig::example();
     let Simulation { clock, world, .. } = Simulation::new(&config);
@@ -97,7 +98,7 @@ fn beside(wrong_until: u32, change: Change, long: Duration, act: fn(&Attached, I
     Done { flow: flow_health, imu: imu_health, resets, first, samples, delays: bus.delays() }
 }
 
-/// What can be wrong with a start, and what it is called.
+/// Failures of a start, and the errors that they cause.
 const WRONG: [(&str, Change, SensorErrorKind); 5] = [
     (
         "identity",
@@ -126,7 +127,7 @@ const WRONG: [(&str, Change, SensorErrorKind); 5] = [
         },
         SensorErrorKind::Configuration,
     ),
-    // Another value each time: one that stays counts as a register that cannot be read back.
+    // A different value each time: a constant one counts as a register that cannot be read back.
     (
         "setting",
         |register, answer, number| {
@@ -150,7 +151,7 @@ fn a_chip_that_answers_its_start_wrongly_n_times_is_started_again_and_works_at_l
             let done = beside(wrong, change, limit, untouched);
             assert_eq!(done.resets, wrong + 1, "{name}, {wrong} times: reset for each start, and none after");
             assert!(done.first.is_some(), "{name}, {wrong} times: {:?}", done.flow);
-            // A start that finds a wrong setting tries a second time by itself.
+            // A start that finds a wrong setting tries once more by itself.
             let failed = if name == "setting" { wrong / 2 } else { wrong };
             assert_eq!(done.flow.errors(), failed, "{name}, {wrong} times");
             assert_eq!(done.flow.last_error(), (failed > 0).then_some(kind), "{name}, {wrong} times");
@@ -166,7 +167,7 @@ fn a_chip_that_never_starts_is_reported_again_and_again_and_the_inertial_sensor_
     for (name, change, kind) in WRONG {
         let done = beside(u32::MAX, change, long, untouched);
         assert_eq!((done.flow.samples(), done.flow.last_error()), (0, Some(kind)), "{name}");
-        // Every 230 ms at the latest.
+        // At least every 230 ms.
         assert!(done.flow.errors() > 16, "{name}: {} errors in 4 s", done.flow.errors());
         assert_eq!((done.imu.errors(), done.delays), (0, 0), "{name}");
         assert!(
@@ -183,7 +184,7 @@ fn a_chip_that_comes_out_of_a_power_cycle_on_a_noisy_bus_works_when_the_noise_is
         |_, _, _| {},
         Duration::from_secs(3),
         |chip, now| {
-            // Power fails at half a second, and for a second one bit in twenty is wrong.
+            // The supply fails at 0.5 s, and for one second one bit in twenty is wrong.
             let noisy = (Instant::from_millis(500)..Instant::from_millis(1_500)).contains(&now);
             if now == Instant::from_millis(500) {
                 chip.reset();
@@ -192,7 +193,7 @@ fn a_chip_that_comes_out_of_a_power_cycle_on_a_noisy_bus_works_when_the_noise_is
         },
     );
     assert!(done.flow.errors() > 3, "{:?}", done.flow);
-    // From 1.5 s on there are 80 ms of pause and two starts of 75 ms at most; then a hundred a second.
+    // From 1.5 s on: at most 80 ms of pause and two starts of 75 ms; then 100 samples per second.
     assert!(done.flow.samples() > 30 + 110, "{:?}", done.flow);
     assert!(done.resets > 4, "each start begins with the reset: {}", done.resets);
     assert_eq!(done.imu.errors(), 0);

@@ -1,4 +1,4 @@
-//! INA3221.
+//! Driver of the INA3221.
 
 use crate::standing;
 use stampfly_drivers::PowerMonitor;

@@ -1,8 +1,9 @@
-//! Every driver for I2C on a program as on Linux: a blocking bus that starts again before each operation, and a delay that cannot be
-//! cloned.
+//! I²C drivers as on Linux: a blocking bus with a start before each operation, and a delay that
+//! cannot be cloned.
 //!
-//! `linux-embedded-hal` makes a message of the kernel's of each operation, and the kernel begins each with a start. A chip that gets a
-//! start between register and data takes the data for a register. What a driver is made of is taken back at the end, and makes another one.
+//! `linux-embedded-hal` sends each operation as a separate message, which the kernel begins with a
+//! start. A chip that receives a start between register and data takes the data for a register. At
+//! the end each driver releases its bus and delay, from which another one is made.
 
 use crate::{mounting, standing};
 use embedded_hal::delay::DelayNs;
@@ -39,7 +40,7 @@ pub fn clock(simulation: &Simulation) -> BlockingClock<Delay, impl Fn() -> Insta
     BlockingClock::new(Delay(simulation.clock.clone()), move || now.now())
 }
 
-/// So many samples, and each as it should be.
+/// Takes this many samples and checks each.
 pub fn delivers<E: core::fmt::Debug>(samples: usize, mut next: impl FnMut() -> Result<bool, E>) {
     for number in 0..samples {
         assert!(next().expect("a sample"), "sample {number}");

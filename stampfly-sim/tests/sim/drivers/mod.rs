@@ -1,6 +1,7 @@
-//! The real drivers over the emulated chips: identification, settings, data, self tests, times.
+//! The real drivers on the emulated chips: identification, settings, data, self-tests, timing.
 //!
-//! Emulators and drivers were written apart, each from the data sheet. What agrees here was understood the same twice.
+//! Emulators and drivers were written independently from the data sheets, so agreement means two
+//! equal readings.
 
 mod bmi270;
 mod bmi270_interrupt;
@@ -32,7 +33,7 @@ use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::{Duration, Instant};
 use std::rc::Rc;
 
-/// Takes everything and shows nothing.
+/// A display interface that accepts all data and shows nothing.
 #[derive(Debug)]
 struct Display;
 
@@ -45,12 +46,12 @@ impl Chip for Display {
     fn set_id(&mut self, _: u16) {}
 }
 
-/// The registers from this one on.
+/// Registers from this one on.
 fn registers<const N: usize>(chip: &Attached, first: u16) -> [u8; N] {
     core::array::from_fn(|n| chip.peek(first + n as u16) as u8)
 }
 
-/// Keeps the vehicle 0.8 m above the floor, in whatever wind there is.
+/// Keeps the vehicle 0.8 m above the floor in any wind.
 fn hover(tasks: &mut Tasks<'_>, clock: Clock, world: World, mut motors: MotorModel) {
     tasks.spawn(async move {
         loop {
@@ -61,10 +62,10 @@ fn hover(tasks: &mut Tasks<'_>, clock: Clock, world: World, mut motors: MotorMod
     });
 }
 
-/// What went over the wires of a device: the first byte out, and all bytes that were read.
+/// Traffic of a device: first byte written, and all bytes read.
 type Transfers = Rc<RefCell<Vec<(u8, Vec<u8>)>>>;
 
-/// A device whose transfers are noted.
+/// A device whose transfers are recorded.
 struct Tap<S> {
     device: S,
     transfers: Transfers,

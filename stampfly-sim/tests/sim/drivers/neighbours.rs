@@ -1,4 +1,4 @@
-//! Two chips on one bus: faults of one that leave the other alone.
+//! Two chips on one bus: faults of one do not affect the other.
 
 use crate::standing;
 use stampfly_drivers::chip::bmp280::{self, Bmp280};
@@ -9,7 +9,7 @@ use stampfly_sim::chips::{self, Attached, Faults, I2cBus};
 use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Duration;
 
-/// A vehicle on the floor in still air, its barometer and its battery monitor on one bus.
+/// A vehicle on the floor in still air, with barometer and battery monitor on one bus.
 struct Bench {
     simulation: Simulation,
     clock: Clock,
@@ -25,7 +25,7 @@ fn bench() -> Bench {
     let bus = I2cBus::new(&clock, 1);
     let barometer = bus.attach(Bmp280::SDO_LOW, chips::Bmp280::new(&simulation.world, &clock, 1));
     let monitor = bus.attach(Ina3221::A0_GROUND, chips::Ina3221::new(&simulation.world, &clock, 1));
-    // Both start up within two milliseconds.
+    // Both start up within 2 ms.
     clock.advance_to(clock.now() + Duration::from_millis(5));
     let baro = Bmp280::i2c(bus.clone(), Bmp280::SDO_LOW, clock.clone(), bmp280::Config::default());
     let power = Ina3221::new(bus, Ina3221::A0_GROUND, clock.clone(), ina3221::Config::default());
@@ -43,7 +43,7 @@ impl Bench {
         sample.map(|sample| sample.data.voltage).map_err(|error| error.kind())
     }
 
-    /// How long a call takes, and what comes of it.
+    /// Duration and result of a call.
     fn timed<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> (Duration, T) {
         let begun = self.clock.now();
         let outcome = call(self);
@@ -56,7 +56,7 @@ fn both_measure_what_is_there() {
     let mut bench = bench();
     let pressures: Vec<f32> = (0..20).map(|_| bench.pressure().unwrap()).collect();
     let (low, high) = pressures.iter().fold((f32::MAX, f32::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
-    // Standing near sea level, in weather and with the chip's offset; noise of some pascals.
+    // At rest near sea level, with weather and the chip's offset; noise of some pascals.
     assert!((99_000.0..104_000.0).contains(&low) && high - low < 20.0, "{low} to {high} Pa");
     let truth = bench.simulation.truth().battery_voltage;
     let measured = bench.voltage().unwrap();

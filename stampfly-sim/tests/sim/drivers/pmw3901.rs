@@ -1,4 +1,4 @@
-//! PMW3901.
+//! Driver of the PMW3901.
 
 use super::{Tap, hover, registers};
 use crate::{mounting, standing};
@@ -35,7 +35,8 @@ fn the_start_keeps_every_pause_and_leaves_the_bank_of_the_data() {
     assert_eq!(block_on(&simulation.clock, driver.start()), Ok(()));
     let took = simulation.clock.now().since(begun);
     assert!((Duration::from_millis(65)..Duration::from_millis(85)).contains(&took), "75 ms: {took}");
-    // Writes that came too early would be missing: the last of bank 0, and the identity that only this bank shows.
+    // Writes that came too early would be missing: the last of bank 0, and the identity, readable
+    // in this bank only.
     assert_eq!(registers(&attached, 0x4D), [0x11, 0xA8]);
     assert_eq!([0x5A, 0x5B, 0x40].map(|register| attached.peek(register)), [0x50, 0xA0, 0x80]);
     assert_eq!(attached.peek(0x00), 0x49);
@@ -112,7 +113,7 @@ fn after_a_start_that_succeeds_on_a_noisy_bus_it_sees() {
             if block_on(clock, driver.next()).expect("a sample").data.quality > 0 {
                 continue;
             }
-            // What is written twice, or to a register that the list does not know, cannot be read back.
+            // Registers that are written twice or are not in the list cannot be read back.
             blind += 1;
             let begun = clock.now();
             while !block_on(clock, driver.next()).is_ok_and(|sample| sample.data.quality > 0) {

@@ -1,4 +1,5 @@
-//! Inertial and flow sensor on one SPI, in modes and on controllers of every kind: which of them start and measure.
+//! Inertial and flow sensor on one SPI in all modes and on all controllers: which combinations
+//! start and measure.
 
 use crate::mounting;
 use core::cell::{Cell, RefCell};
@@ -13,13 +14,13 @@ use stampfly_sim::time::Tasks;
 use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::{Duration, Instant};
 
-/// How both did in three seconds.
+/// Results of both sensors in three seconds.
 struct Done {
     imu: SensorHealth,
     flow: SensorHealth,
-    /// Samples of the flow sensor with a picture in it.
+    /// Samples of the flow sensor that contain a picture.
     pictures: u32,
-    /// Every sample of both, when it came.
+    /// All samples of both with their instants of delivery.
     samples: Vec<(Instant, String)>,
 }
 
@@ -63,7 +64,7 @@ impl core::fmt::Debug for Done {
     }
 }
 
-/// As the firmware was once: the inertial sensor in mode 0.
+/// As the firmware once was: the inertial sensor in mode 0.
 const TWO_MODES: fn(Controller) -> SpiSetup =
     |controller| SpiSetup { controller, imu: (MODE_0, 10_000_000), ..SpiSetup::default() };
 
@@ -71,7 +72,7 @@ const TWO_MODES: fn(Controller) -> SpiSetup =
 fn two_modes_on_an_esp32_s3_leave_the_flow_sensor_without_a_picture() {
     let done = three_seconds(&TWO_MODES(Controller::LevelWithTransfer), false);
     assert!(done.pictures == 0 && done.flow.errors() > 5, "{done:?}");
-    // It is not seen at the one that idles low.
+    // It is not noticed at the sensor whose clock idles low.
     assert!(done.imu.samples() > 1_000 && done.imu.errors() == 0, "{done:?}");
 }
 
@@ -102,7 +103,8 @@ fn without_a_byte_to_nobody_the_first_transfer_is_wrong_which_the_inertial_senso
     let setup = SpiSetup { begins_with_nobody: false, ..SpiSetup::default() };
     let done = three_seconds(&setup, false);
     assert!(done.pictures > 270 && done.flow.errors() == 0 && done.imu.errors() == 0, "{done:?}");
-    // Were it the flow sensor's, it would read another identity: `the_first_transfer_after_reset_is_wrong_on_an_esp32_s3` in `chips/wire.rs`.
+    // With the flow sensor first, another identity would be read:
+    // `the_first_transfer_after_reset_is_wrong_on_an_esp32_s3` in `chips/wire.rs`.
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Inertial and flow sensor on one bus in slots: the one on time, the other in between.
+//! Inertial and flow sensor on one bus in time slots: the first on time, the second in between.
 
 use crate::mounting;
 use core::cell::{Cell, RefCell};
@@ -12,20 +12,20 @@ use stampfly_sim::{Simulation, SimulationConfig};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, Instant};
 
-/// The flow sensor's longest transfer.
+/// Longest transfer of the flow sensor.
 const LONGEST: Duration = Duration::from_micros(200);
 const END: Instant = Instant::from_secs(30);
 /// Both have started.
 const BEGIN: Instant = Instant::from_secs(1);
 
-/// Asks an inertial sensor again and again.
+/// Requests samples from an inertial sensor endlessly.
 async fn deliver(mut imu: impl Imu, note: impl Fn(Sample<ImuData>)) {
     loop {
         note(imu.next().await.expect("no error"));
     }
 }
 
-/// The worst of one vehicle, whose inertial sensor's interrupt is wired or not: age of an inertial sample at its
+/// Worst case of one vehicle with or without interrupt pin: age of an inertial sample at its
 /// delivery, and time between two flow samples.
 fn worst(seed: u64, wired: bool) -> [Duration; 2] {
     let config = SimulationConfig { seed, ..SimulationConfig::example() };
@@ -64,7 +64,7 @@ fn worst(seed: u64, wired: bool) -> [Duration; 2] {
         }
     });
     tasks.run_until(BEGIN);
-    // The inertial sensor's long transfers of its start are over.
+    // The long transfers of the inertial sensor's start are over.
     let before = bus.delays();
     tasks.run_until(END);
     drop(tasks);
@@ -81,7 +81,8 @@ fn the_lead_never_waits_and_the_guest_hardly() {
         let most = |index: usize| figures.iter().map(|figure| figure[index]).max().expect("eight");
         let name = if wired { "with its interrupt" } else { "without its interrupt" };
         println!("inertial sample {name} {} old, {} between flow samples, at worst", most(0), most(1));
-        // Three chip samples of a slow clock (1.91 ms) and the read-out; 10 ms and what fits no earlier slot.
+        // Three chip samples of a slow clock (1.91 ms) plus the read-out; 10 ms plus the wait for a
+        // slot.
         assert!(most(0) <= Duration::from_micros(2_150), "{name}: {figures:?}");
         assert!(most(1) <= Duration::from_micros(10_750), "{name}: {figures:?}");
     }

@@ -1,7 +1,8 @@
-//! Every driver for SPI on a blocking bus as on Linux, and on one that it shares with a display: a kilobyte every few milliseconds, at 8 MHz or
-//! at 1.
+//! SPI drivers on a blocking bus as on Linux, and on a bus shared with a display: a kilobyte every
+//! few milliseconds, at 8 or 1 MHz.
 //!
-//! What I2C does is in `linux` and `display`. Waiting for the bus is no fault of the chip here either, so no driver gives up because of it.
+//! For I²C see `linux` and `display`. Waiting for the bus is not a fault of the chip, so no driver
+//! may give up because of it.
 
 use super::Display;
 use super::linux::{clock, delivers};
@@ -19,11 +20,11 @@ use stampfly_sim::chips::{self, SpiBus, SpiChip, SpiPort, stand_in_image};
 use stampfly_sim::time::{Clock, Tasks};
 use stampfly_types::{Duration, Instant};
 
-/// The clock that each chip allows, Hz.
+/// Clock allowed by each chip, Hz.
 const BOSCH: u32 = 10_000_000;
 const PIXART: u32 = 2_000_000;
 const FRAME: [u8; 1_024] = [0x55; 1_024];
-/// From the end of a frame to the beginning of the next.
+/// Time from the end of a frame to the beginning of the next.
 const PAUSE: Duration = Duration::from_millis(10);
 /// A frame takes 1 ms, or 8.2 ms.
 const SPEEDS: [u32; 2] = [8_000_000, 1_000_000];
@@ -104,14 +105,15 @@ fn both_kinds_of_wires_give_the_same_samples_of_one_chip() {
     bus.attach(Bmp280::SDO_LOW, barometer(&simulation));
     let mut baro = Bmp280::i2c(Blocking(bus), Bmp280::SDO_LOW, clock(&simulation), bmp280::Config::default());
     for (on_i2c, on_spi) in (0..20).map(|_| block_on(baro.next()).expect("a sample").data.pressure).zip(on_spi) {
-        // Conversions a millisecond apart, of the same specimen with the same noise.
+        // Conversions one millisecond apart of the same specimen with the same noise.
         assert!((on_i2c - on_spi).abs() < 2.0, "{on_i2c} {on_spi}");
     }
 }
 
 type Outcomes = RefCell<Vec<Result<Instant, SensorErrorKind>>>;
 
-/// What `call` makes of the bus beside a display, for three seconds: samples, and the kinds of errors.
+/// Runs `call` on the bus next to a display for three seconds: number of samples, and kinds of
+/// errors.
 fn beside_a_display<C: SpiChip + 'static>(
     frequency: u32,
     speed: u32,
@@ -137,7 +139,7 @@ fn beside_a_display<C: SpiChip + 'static>(
     seen.into_inner()
 }
 
-/// A driver that is asked for samples for ever.
+/// Requests samples from a driver endlessly.
 macro_rules! asked {
     (|$port:ident, $clock:ident| $driver:expr) => {
         async |$port, $clock: Clock, seen: &Outcomes| {
@@ -150,7 +152,7 @@ macro_rules! asked {
     };
 }
 
-/// All of them samples, at least so many, and none twice.
+/// Checks that there are no errors, at least this many samples, and none twice.
 fn all_samples(name: &str, speed: u32, seen: &[Result<Instant, SensorErrorKind>], least: usize) {
     let errors: Vec<_> = seen.iter().filter(|outcome| outcome.is_err()).collect();
     assert!(errors.is_empty(), "{name} at {speed} Hz: {} of {} fail: {:?}", errors.len(), seen.len(), errors[0]);
@@ -164,7 +166,7 @@ fn an_inertial_sensor_waits_and_loses_no_sample() {
     let image = stand_in_image();
     for speed in SPEEDS {
         let driver = asked!(|port, clock| Bmi270::spi(port, clock, &image, mounting::IMU, bmi270::Config::default()));
-        // 400 a second, but for a fifth of a second to start.
+        // 400 per second, minus 0.2 s of start-up.
         all_samples("inertial sensor", speed, &beside_a_display(BOSCH, speed, inertial, driver), 1_000);
     }
 }

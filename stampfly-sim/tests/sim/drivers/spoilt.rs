@@ -1,4 +1,4 @@
-//! A bus that changes what a chip answers, or takes its time.
+//! A bus that changes a chip's answers or adds latency.
 
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
@@ -6,32 +6,32 @@ use stampfly_sim::chips::BusError;
 use stampfly_sim::time::Clock;
 use stampfly_types::Duration;
 
-/// What becomes of the answer of a register.
+/// Transformation of a register's answer.
 pub type Change = Box<dyn Fn(u16, &mut [u8])>;
 
-/// What is wrong with the bus.
+/// Fault of the bus.
 pub struct Spoil {
-    /// How much longer every transfer takes.
+    /// Additional duration of every transfer.
     pub delay: Duration,
     pub change: Option<Change>,
 }
 
 impl Spoil {
-    /// Nothing.
+    /// No fault.
     pub const NOT: Self = Self { delay: Duration::ZERO, change: None };
 
-    /// Answers are changed.
+    /// Changed answers.
     pub fn changed(change: Change) -> Self {
         Self { change: Some(change), ..Self::NOT }
     }
 
-    /// Every transfer takes so much longer.
+    /// Additional duration of every transfer.
     pub const fn slow(delay: Duration) -> Self {
         Self { delay, change: None }
     }
 }
 
-/// A bus with that.
+/// A bus with this fault.
 pub struct Spoilt<B> {
     pub bus: B,
     pub clock: Clock,

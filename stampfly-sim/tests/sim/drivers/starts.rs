@@ -1,6 +1,7 @@
-//! Whatever happens during a start, the calls after it bring the chip to life.
+//! After any disturbance of a start, further calls bring the chip into operation.
 //!
-//! Every transfer of a start fails once, before or after the chip has seen it, and a start is dropped at any time of it.
+//! Every transfer of a start fails once, before or after it reaches the chip, and a start is
+//! dropped at any instant.
 
 use crate::{mounting, standing};
 use core::cell::Cell;
@@ -24,12 +25,12 @@ use stampfly_sim::time::{Clock, block_on};
 use stampfly_types::Instant;
 use std::rc::Rc;
 
-/// Transfers until the one that fails, and whether the chip sees that one.
+/// Number of transfers before the failing one, and whether the chip receives that one.
 #[derive(Clone, Default)]
 struct Trouble(Rc<Cell<Option<(u32, bool)>>>);
 
 impl Trouble {
-    /// One transfer on: what happens to it.
+    /// Counts a transfer and returns its fate.
     fn next(&self) -> Option<bool> {
         let (left, seen) = self.0.get()?;
         self.0.set(left.checked_sub(1).map(|left| (left, seen)));
@@ -68,7 +69,7 @@ impl<B: SpiDevice<Error = BusError>> SpiDevice for Unreliable<B> {
     }
 }
 
-/// Polls a call until it ends or this instant has come, and drops it then.
+/// Polls a call until it ends or this instant is reached, and then drops it.
 async fn drop_at<T>(clock: &Clock, instant: Instant, call: impl Future<Output = T>) -> Option<T> {
     let (mut call, mut end) = (pin!(call), pin!(clock.sleep_until(instant)));
     poll_fn(|context| match (call.as_mut().poll(context), end.as_mut().poll(context)) {
@@ -79,7 +80,7 @@ async fn drop_at<T>(clock: &Clock, instant: Instant, call: impl Future<Output = 
     .await
 }
 
-/// A start that is disturbed, then calls until one measures what a healthy chip does.
+/// A disturbed start, then calls until one returns the measurement of a healthy chip.
 macro_rules! recovers {
     ($name:ident, $step:literal, |$board:ident, $clock:ident, $trouble:ident $(, $image:ident)? $(; $boot:ident)?| $driver:expr,
      |$data:ident| $healthy:expr) => {

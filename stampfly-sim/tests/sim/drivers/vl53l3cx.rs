@@ -1,4 +1,4 @@
-//! Two VL53L3CX on one bus.
+//! Driver of the VL53L3CX: two chips on one bus.
 
 use super::{hover, registers};
 use crate::standing;
@@ -21,7 +21,7 @@ const AHEAD: u8 = 0x31;
 struct Bench {
     bus: I2cBus,
     pins: [ShutdownPin; 2],
-    /// Below, ahead.
+    /// Bottom and front.
     attached: [Attached; 2],
 }
 
@@ -36,7 +36,7 @@ fn bench(simulation: &Simulation) -> Bench {
 
 type Driver<'b> = Vl53l3cx<'b, I2cBus, ShutdownPin, Clock>;
 
-/// Both drivers, with the chips' handles.
+/// Both drivers with handles to their chips.
 fn drivers<'b>(
     simulation: &Simulation,
     boot: &'b BootAddress,
@@ -93,7 +93,7 @@ fn in_flight_the_distance_is_that_of_the_registers_and_the_truth() {
     tasks.spawn(async {
         loop {
             let sample = below.next().await.expect("no fault is simulated");
-            // The read took the interrupt back, but the distance stays until the next measurement.
+            // The read cleared the interrupt, but the distance stays until the next measurement.
             let millimetres = u16::from_be_bytes(registers(&chip, 0x0096));
             assert!((sample.data.distance - f32::from(millimetres) * 1e-3).abs() < 1e-6, "{sample:?} {millimetres}");
             let now = truth.truth_at(sample.at);
@@ -108,7 +108,8 @@ fn in_flight_the_distance_is_that_of_the_registers_and_the_truth() {
     assert!(!samples[0].0.data.valid, "the first is not vouched for");
     let valid: Vec<_> = samples[1..].iter().filter(|(sample, _)| sample.data.valid).collect();
     assert!(valid.len() * 100 > samples.len() * 97, "{} of {}", valid.len(), samples.len());
-    // The specimen is off by 3 mm at most; four deviations of a measurement; 1 m/s for the 2 ms between two looks.
+    // At most 3 mm of the specimen's offset; four standard deviations of a measurement; 1 m/s for
+    // the 2 ms between two polls.
     let worst = valid.iter().map(|(_, error)| error.abs()).fold(0.0, f32::max);
     assert!(worst < 0.003 + 4.0 * 0.0017 + 0.002, "{worst} m");
 }
@@ -123,7 +124,8 @@ fn the_first_sample_and_the_rhythm_are_in_time() {
     assert!(clock.now().since(begun) < Duration::from_millis(85), "{}", clock.now().since(begun));
     let stamps: Vec<_> = (0..60).map(|_| block_on(clock, below.next()).expect("a measurement").at).collect();
     let mean = stamps[59].since(stamps[0]).seconds() / 59.0;
-    // A measurement begins when the one before has been read, which is up to 2 ms and a read after its end.
+    // A measurement begins when the previous one has been read, which is up to 2 ms plus a read
+    // after its end.
     assert!((0.0327..0.0360).contains(&mean), "{mean} s between samples");
 }
 
@@ -163,7 +165,7 @@ fn a_chip_without_a_pin_starts_before_its_neighbour_and_again_after_a_dip_of_the
     }
     block_on(clock, ahead.next()).expect("a measurement");
     assert!(block_on(clock, below.next()).expect("a measurement").data.valid);
-    // Moved already, and reset where it is.
+    // Already moved, and reset at its new address.
     assert_eq!(block_on(clock, below.self_test()), Ok(()));
     assert_eq!(registers(&attached[0], 0x0001), [BELOW]);
     assert!(block_on(clock, ahead.next()).is_ok(), "notices nothing");

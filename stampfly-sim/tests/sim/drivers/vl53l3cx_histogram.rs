@@ -1,4 +1,4 @@
-//! The VL53L3CX's second way to range over the emulated chip, and the first one's trial.
+//! The VL53L3CX's histogram mode on the emulated chip, and the trial of its normal mode.
 
 use super::registers;
 use crate::standing;
@@ -49,7 +49,7 @@ fn valid(outcomes: &[Outcome]) -> Vec<TofData> {
     outcomes.iter().filter_map(|outcome| outcome.ok()).map(|sample| sample.data).filter(|data| data.valid).collect()
 }
 
-/// Mean, standard deviation.
+/// Mean and standard deviation.
 fn spread(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
     let count = values.clone().count() as f32;
     let mean = values.clone().sum::<f32>() / count;
@@ -68,7 +68,7 @@ fn every_distance_within_reach_is_measured_and_its_noise_is_known() {
         assert!(!outcomes[0].as_ref().expect("a sample").data.valid, "the first is not vouched for");
         let (mean, deviation) = spread(data.iter().map(|data| data.distance));
         let (said, _) = spread(data.iter().map(|data| data.sigma));
-        // Four deviations of the mean, and a hundredth of a bin for the reference pulse.
+        // Four standard deviations of the mean, and a hundredth of a bin for the reference pulse.
         assert!((mean - metres as f32).abs() < 4.0 * deviation / 20.0 + 0.002, "{mean} m at {metres} m");
         assert!((0.7..1.5).contains(&(said / deviation)), "{said} m is said, {deviation} m is, at {metres} m");
     }
@@ -76,7 +76,8 @@ fn every_distance_within_reach_is_measured_and_its_noise_is_known() {
 
 #[test]
 fn what_is_out_of_reach_is_never_taken_for_something_near() {
-    // 3.97 m and 4.76 m are the laser's periods: a target there, or twice there, appears at nothing in one part.
+    // 3.97 m and 4.76 m correspond to the laser periods: a target at one or two of them appears at
+    // zero in one part.
     for centimetres in (330..1_000).step_by(13) {
         let (simulation, boot) = (standing(), BootAddress::new());
         let (mut below, chip) = driver(&simulation, &boot, (7, Mount::Bottom), Ranging::Histogram);
@@ -142,7 +143,7 @@ fn a_chip_that_ranges_by_itself_is_not_asked_anything_else() {
             assert_eq!((driver.ranging(), driver.doubt()), (Ranging::Light, None));
             (outcomes, simulation.clock.now())
         };
-        // Sample by sample, and to the microsecond.
+        // Sample by sample, to the microsecond.
         assert_eq!(run(Ranging::Light), run(ANYWHERE), "{mount:?}");
     }
     let (simulation, boot) = (standing(), BootAddress::new());
@@ -168,7 +169,8 @@ fn what_has_been_settled_is_not_asked_again() {
     let (simulation, boot) = (standing(), BootAddress::new());
     let (mut below, chip) = driver(&simulation, &boot, (3, Mount::Bottom), AT_TARGET);
     several(&mut below, &simulation.clock, 30);
-    // In flight the chip goes mad, and it restarts: neither changes how height is measured.
+    // In flight the chip's own distances fail, then it restarts: neither changes the method of
+    // ranging.
     chip.set_flaw(Some(Flaw::LightMode(Nonsense::Frozen)));
     several(&mut below, &simulation.clock, 60);
     chip.reset();
@@ -221,9 +223,9 @@ fn samples_come_in_time_and_are_stamped_in_the_middle() {
         ages.push(clock.now().since(at).seconds());
     }
     let mean = stamps[59].since(stamps[0]).seconds() / 59.0;
-    // 33 ms, and what is sent and read in between.
+    // 33 ms, plus the transfers in between.
     assert!((0.033..0.0405).contains(&mean), "{mean} s between samples");
-    // Half a measurement, a read of 2 ms, and up to 2 ms between two looks.
+    // Half a measurement, a read of 2 ms, and up to 2 ms between two polls.
     assert!(ages.iter().all(|age| (0.0165..0.0215).contains(age)), "{ages:?}");
 }
 

@@ -1,4 +1,4 @@
-//! BMP280.
+//! Self-test of the BMP280's driver.
 
 use super::{Bench, FAILED, Outcome, configuration, identification, put};
 use crate::drivers::spoilt::{Spoil, Spoilt};
@@ -41,20 +41,20 @@ fn says_what_failed() {
         60,
         [
             (put(0xD0, 1, 0, &[0x55]), identification(0x55)),
-            // No calibration, no T1, no P1; P1 that makes any pressure too high.
+            // No calibration, T1 or P1 of zero; P1 that makes any pressure too high.
             (put(0x88, 24, 0, &[0; 24]), DATA),
             (put(0x88, 24, 0, &[0xFF; 24]), DATA),
             (put(0x88, 24, 0, &[0, 0]), DATA),
             (put(0x88, 24, 6, &[0, 0]), DATA),
             (put(0x88, 24, 6, &[1, 0]), FAILED),
-            // Copies its calibration for ever; keeps neither oversampling nor filter.
+            // Copies its calibration endlessly; keeps neither oversampling nor filter.
             (put(0xF3, 1, 0, &[1]), configuration(1)),
             (put(0xF4, 2, 0, &[0x24]), configuration(0x24)),
             (put(0xF4, 2, 1, &[0]), configuration(0)),
-            // Begins no conversion, ends none.
+            // Begins no conversion; ends none.
             (put(0xF3, 2, 0, &[0, 0]), NO_SAMPLE),
             (put(0xF3, 10, 0, &[8]), NO_SAMPLE),
-            // Pressure and temperature: never measured, at either end; 90 °C.
+            // Pressure and temperature: never measured, at either limit; 90 °C.
             (put(0xF3, 10, 4, &[0x80, 0, 0]), FAILED),
             (put(0xF3, 10, 7, &[0x80, 0, 0]), FAILED),
             (put(0xF3, 10, 4, &[0; 3]), FAILED),

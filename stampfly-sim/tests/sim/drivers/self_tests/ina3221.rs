@@ -1,4 +1,4 @@
-//! INA3221.
+//! Self-test of the INA3221's driver.
 
 use super::{Bench, FAILED, Outcome, configuration, identification, put};
 use crate::drivers::spoilt::{Spoil, Spoilt};
@@ -46,7 +46,7 @@ fn says_what_failed() {
             (put(0xFF, 2, 1, &[0x60]), identification(0x3260)),
             (put(0x00, 2, 0, &[0x71, 0x27]), configuration(0x71)),
             (put(0x0F, 2, 1, &[0]), Err(ChipError::NoSample)),
-            // 0 V, −8 mV, 26.008 V; either end of the shunt's scale.
+            // 0 V, −8 mV, 26.008 V; both limits of the shunt's range.
             (put(4, 2, 0, &[0, 0]), FAILED),
             (put(4, 2, 0, &[0xFF, 0xF8]), FAILED),
             (put(4, 2, 0, &[0x65, 0x98]), FAILED),

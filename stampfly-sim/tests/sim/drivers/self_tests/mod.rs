@@ -1,5 +1,5 @@
-//! The self tests of the chips that have none of their own: a healthy chip passes and measures on as before, each way of
-//! failing is named, and whatever the bus does, they end.
+//! Self-tests of chips without a built-in one: a healthy chip passes and continues to measure, each
+//! failure is named, and the test ends with any bus fault.
 
 use crate::drivers::spoilt::Change;
 use core::cell::Cell;
@@ -10,7 +10,7 @@ use stampfly_sim::time::Clock;
 type Outcome = Result<(), ChipError<BusError>>;
 type Bench<D> = (Clock, Attached, D);
 
-/// In answers of this length to this register, these bytes from this place on.
+/// Replaces bytes in answers of this length to this register, from this position on.
 fn put(register: u16, length: usize, place: usize, bytes: &'static [u8]) -> Change {
     Box::new(move |asked, answer| {
         if (asked, answer.len()) == (register, length) {
@@ -19,7 +19,7 @@ fn put(register: u16, length: usize, place: usize, bytes: &'static [u8]) -> Chan
     })
 }
 
-/// The first byte of this register is another every time it is asked: 1, 2, 3.
+/// The first byte of this register differs with each read: 1, 2, 3.
 fn restless(register: u16) -> Change {
     let count = Cell::new(0);
     Box::new(move |asked, answer| {
@@ -30,7 +30,8 @@ fn restless(register: u16) -> Change {
     })
 }
 
-/// Healthy, or with a sensing element that feels nothing: the outcome follows, in time, and the chip measures as before.
+/// Healthy, or with a broken sensing element: checks result, duration, and that the chip measures
+/// as before.
 macro_rules! tells_healthy_from_broken {
     ($bench:expr, $millis:expr, $figure:ident, $tolerance:expr) => {
         for broken in [false, true] {
@@ -57,7 +58,7 @@ macro_rules! tells_healthy_from_broken {
     };
 }
 
-/// On a bus that never answers, refuses, garbles or is slow, before and after a start.
+/// On a bus without answers, with refusals, bit errors or latency, before and after a start.
 macro_rules! ends_in_time {
     ($bench:expr, $slow:expr, $millis:expr) => {
         let limit = Duration::from_millis($millis);
@@ -96,7 +97,7 @@ macro_rules! ends_in_time {
     };
 }
 
-/// Each change of the chip's answers has its outcome.
+/// Each change of the chip's answers has its result.
 macro_rules! says {
     ($bench:expr, $millis:expr, $changes:expr) => {
         for (number, (change, expected)) in $changes.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! PMW3901.
+//! Self-test of the PMW3901's driver.
 
 use super::{Bench, FAILED, Outcome, configuration, identification, put, restless};
 use crate::drivers::spoilt::{Spoil, Spoilt};
@@ -38,10 +38,10 @@ fn says_what_failed() {
             (put(0x00, 1, 0, &[0x42]), identification(0x42B6)),
             (put(0x5F, 1, 0, &[0x49]), identification(0x4949)),
             (put(0x47, 1, 0, &[0]), configuration(0)),
-            // A value that stays counts as one that cannot be read back. Two banks have such a register, each is asked twice:
-            // the sixth answer is the one that the second start ends with.
+            // A constant value counts as one that cannot be read back. Two banks have such a
+            // register and each is read twice, so the second start ends with the sixth answer.
             (restless(0x4E), configuration(6)),
-            // The burst: brightest and darkest from place 8, the shutter from 10.
+            // The burst: maximum and minimum from byte 8, the shutter from byte 10.
             (put(0x16, 12, 0, &[0xFF; 12]), Err(ChipError::Data)),
             (put(0x16, 12, 8, &[0x10, 0x11]), FAILED),
             (put(0x16, 12, 7, &[0; 3]), FAILED),

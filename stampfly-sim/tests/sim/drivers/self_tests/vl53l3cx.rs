@@ -1,4 +1,4 @@
-//! VL53L3CX.
+//! Self-test of the VL53L3CX's driver.
 
 use super::{Bench, FAILED, Outcome, configuration, identification, put, restless};
 use crate::drivers::spoilt::{Spoil, Spoilt};
@@ -37,7 +37,7 @@ fn tells_a_healthy_chip_from_a_broken_one() {
 
 #[test]
 fn ends_in_time() {
-    // 21 periods and a second.
+    // 21 periods plus one second.
     ends_in_time!(range, 9, 1_700);
 }
 
@@ -53,12 +53,12 @@ fn says_what_failed() {
             (put(0xE5, 1, 0, &[2]), configuration(2)),
             (put(0x5E, 12, 2, &[0x0B]), configuration(0x0B)),
             (restless(0xDE), Err(ChipError::Data)),
-            // No measurement; all of one number; all the same; nobody on the bus.
+            // No measurement; all with one number; all equal; no chip on the bus.
             (put(0x30, 2, 1, &[0]), NO_SAMPLE),
             (put(0x89, 17, 2, &[7]), NO_SAMPLE),
             (put(0x89, 17, 0, &[7; 17]), NO_SAMPLE),
             (put(0x89, 17, 0, &[0xFF; 17]), Err(ChipError::Data)),
-            // Nothing measured, laser, detector, computation, no status at all.
+            // Nothing measured; laser, detector or computation failed; no status.
             (put(0x89, 17, 0, &[0]), FAILED),
             (put(0x89, 17, 0, &[2]), FAILED),
             (put(0x89, 17, 0, &[3]), FAILED),
