@@ -33,9 +33,12 @@
 extern crate std;
 
 pub mod blocking;
+mod detector;
 mod disarmed;
 mod error;
+mod field;
 mod pages;
+pub mod parameters;
 mod ram;
 pub mod rules;
 mod set;
@@ -43,13 +46,16 @@ mod store;
 mod table;
 mod value;
 
+pub use detector::ChangeDetector;
 pub use disarmed::Disarmed;
 pub use error::{EraseError, LoadError, OpenError, SaveError};
+pub use field::ParameterField;
+pub use parameters::{Number, ParameterError, ParameterInfo, Parameters};
 pub use ram::RamFlash;
 pub use rules::Conflict;
 pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
-pub use table::{Parameter, ParameterError, ParameterTable};
+pub use table::{Parameter, ParameterTable};
 pub use value::{AnyValue, Kind, LONGEST_NAME, Storable};
 
 /// Its traits are in signatures here.

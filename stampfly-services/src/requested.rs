@@ -17,11 +17,12 @@ use stampfly_param::{ParameterAction, ParameterRequest, ParameterTable, rules};
 /// use stampfly_services::Requested;
 /// stampfly_param::parameters! {
 ///     /// A lamp.
-///     pub struct Lamp, where lamp:
-///     /// Light.
-///     light: Light {
-///         /// Brightness.
-///         level = 0.5 in [0.0, 1.0] "1";
+///     pub struct Lamp {
+///         /// Light.
+///         light: Light {
+///             /// Brightness.
+///             level = 0.5 in [0.0, 1.0] "1";
+///         }
 ///     }
 /// }
 /// # fn main() {
@@ -75,9 +76,8 @@ impl<P: ParameterTable, const N: usize> Requested<P, N> {
 
 impl<P: ParameterTable, const N: usize> Parameters for Requested<P, N> {
     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
-        let row = P::TABLE.get(index)?;
-        let (name, unit, meaning) = (row.name, row.unit, row.meaning);
-        Some(ParameterInfo { name, unit, min: row.min, max: row.max, in_flight: false, meaning })
+        let stampfly_param::ParameterInfo { name, unit, min, max, meaning, in_flight } = P::TABLE.get(index)?.info;
+        Some(ParameterInfo { name, unit, min, max, meaning, in_flight })
     }
 
     fn get(&self, index: usize) -> Option<f32> {
@@ -86,7 +86,7 @@ impl<P: ParameterTable, const N: usize> Parameters for Requested<P, N> {
 
     fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
         let row = P::TABLE.get(index).ok_or(ParameterError::Unknown)?;
-        let refused = ParameterError::OutOfRange { min: row.min, max: row.max };
+        let refused = ParameterError::OutOfRange { min: row.info.min, max: row.info.max };
         row.set(&mut self.values, value).map_err(|_| refused)?;
         let request = ParameterRequest { action: ParameterAction::Set, index: index as u32, value };
         // What there is no room for is not asked for.
@@ -94,7 +94,7 @@ impl<P: ParameterTable, const N: usize> Parameters for Requested<P, N> {
     }
 
     fn check(&self, about: Option<usize>) -> Result<(), ParameterError> {
-        let about = about.and_then(|index| P::TABLE.get(index)).map(|row| row.name);
+        let about = about.and_then(|index| P::TABLE.get(index)).map(|row| row.info.name);
         let broken = rules::check(P::RULES, &self.values, about);
         broken.map_err(|Conflict { parameters, reason, .. }| ParameterError::Conflict { parameters, reason })
     }

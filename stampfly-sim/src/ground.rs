@@ -29,11 +29,12 @@
 //! # }
 //! # stampfly_param::parameters! {
 //! #     /// A buoy.
-//! #     pub struct Numbers, where buoy:
-//! #     /// Its lamp.
-//! #     lamp: Lamp {
-//! #         /// Brightness.
-//! #         level = 0.5 in [0.0, 1.0] "1";
+//! #     pub struct Numbers {
+//! #         /// Its lamp.
+//! #         lamp: Lamp {
+//! #             /// Brightness.
+//! #             level = 0.5 in [0.0, 1.0] "1";
+//! #         }
 //! #     }
 //! # }
 //! # #[derive(Debug)]

@@ -6,13 +6,14 @@ use super::{Setting, SetupError};
 use crate::SimulationConfig;
 use crate::plant::{Airframe, ParameterInfo};
 use stampfly_log::ulog::ParameterValue;
-use stampfly_param::ParameterTable;
+use stampfly_param::{ParameterTable, parameters};
 
 /// Every parameter of a configuration.
 #[must_use]
 pub fn settings<P: ParameterTable>(config: &P) -> Vec<Setting> {
     let rows = P::TABLE.iter().map(|row| (row, row.get(config).into()));
-    rows.map(|(row, value)| Setting { name: row.name, value, unit: row.unit, meaning: row.meaning }).collect()
+    rows.map(|(row, value)| Setting { name: row.info.name, value, unit: row.info.unit, meaning: row.info.meaning })
+        .collect()
 }
 
 /// Changes a parameter.
@@ -32,13 +33,13 @@ pub fn change<P: ParameterTable>(config: &mut P, options: &super::Options) -> Re
     for (name, value) in options.parameters()? {
         set(config, name, ParameterValue::Float(value)).map_err(|error| format!("--param {error}"))?;
     }
-    config.validate().map_err(|error| error.to_string())
+    parameters::validate(config).map_err(|error| error.to_string())
 }
 
 /// Lowest and highest value of a parameter; `None` when there is no such.
 #[must_use]
 pub fn range<P: ParameterTable>(name: &str) -> Option<[f64; 2]> {
-    P::find(name).ok().map(|row| [row.min.into(), row.max.into()])
+    P::find(name).ok().map(|row| [row.info.min.into(), row.info.max.into()])
 }
 
 /// Every number of a simulated airframe.

@@ -24,11 +24,12 @@ mod topics {
 
 stampfly_param::parameters! {
     /// A raft.
-    pub struct Numbers, where raft:
-    /// Its lamp.
-    lamp: Lamp {
-        /// Brightness.
-        level = 0.5 in [0.0, 1.0] "1";
+    pub struct Numbers {
+        /// Its lamp.
+        lamp: Lamp {
+            /// Brightness.
+            level = 0.5 in [0.0, 1.0] "1";
+        }
     }
 }
 
