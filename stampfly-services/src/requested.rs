@@ -5,14 +5,12 @@
 //! [`Parameters`] on it.
 
 use heapless::Vec;
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
-use stampfly_param::rules::Conflict;
-use stampfly_param::{ParameterAction, ParameterRequest, ParameterTable, rules};
+use stampfly_param::{ParameterAction, ParameterError, ParameterInfo, ParameterRequest, ParameterTable, Parameters};
 
 /// Values as the service sees them, and what it has asked to change.
 ///
 /// ```
-/// use stampfly_flight::parameters;
+/// use stampfly_param::parameters;
 /// use stampfly_param::ParameterAction;
 /// use stampfly_services::Requested;
 /// stampfly_param::parameters! {
@@ -76,8 +74,7 @@ impl<P: ParameterTable, const N: usize> Requested<P, N> {
 
 impl<P: ParameterTable, const N: usize> Parameters for Requested<P, N> {
     fn describe(&self, index: usize) -> Option<ParameterInfo<'_>> {
-        let stampfly_param::ParameterInfo { name, unit, min, max, meaning, in_flight } = P::TABLE.get(index)?.info;
-        Some(ParameterInfo { name, unit, min, max, meaning, in_flight })
+        P::TABLE.get(index).map(|row| row.info)
     }
 
     fn get(&self, index: usize) -> Option<f32> {
@@ -87,15 +84,13 @@ impl<P: ParameterTable, const N: usize> Parameters for Requested<P, N> {
     fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
         let row = P::TABLE.get(index).ok_or(ParameterError::Unknown)?;
         let refused = ParameterError::OutOfRange { min: row.info.min, max: row.info.max };
-        row.set(&mut self.values, value).map_err(|_| refused)?;
+        row.set(&mut self.values, value)?;
         let request = ParameterRequest { action: ParameterAction::Set, index: index as u32, value };
         // What there is no room for is not asked for.
         self.asked.push(request).map_err(|_| refused)
     }
 
     fn check(&self, about: Option<usize>) -> Result<(), ParameterError> {
-        let about = about.and_then(|index| P::TABLE.get(index)).map(|row| row.info.name);
-        let broken = rules::check(P::RULES, &self.values, about);
-        broken.map_err(|Conflict { parameters, reason, .. }| ParameterError::Conflict { parameters, reason })
+        self.values.check(about)
     }
 }

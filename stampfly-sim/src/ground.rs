@@ -10,7 +10,7 @@
 //! ```
 //! use core::cell::RefCell;
 //! use stampfly_flight::newest::{NewestSamples, longest_message};
-//! use stampfly_flight::parameters::Parameters;
+//! use stampfly_param::Parameters;
 //! use stampfly_services::{Hands, Refusal, Request};
 //! use stampfly_services::link::mavlink::dialects::common::MavType;
 //! use stampfly_sim::fault::Injector;
@@ -90,7 +90,7 @@ use crate::vehicle::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed};
 use core::cell::RefCell;
 use core::net::IpAddr;
 use stampfly_bus::TopicInfo;
-use stampfly_flight::parameters;
+use stampfly_param::parameters;
 use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::link::mavlink::signing::SigningKey;

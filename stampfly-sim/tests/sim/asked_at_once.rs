@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::{Hands, Refusal, Request, Requested};
 use stampfly_sim::fault::Injector;

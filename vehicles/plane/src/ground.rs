@@ -4,7 +4,7 @@ use crate::parameters::Parameters;
 use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_fixed_wing::messages::Home;
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters as ByNumber;
+use stampfly_param::Parameters as ByNumber;
 use stampfly_services::{Hands, Refusal, Request, Requested};
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 use stampfly_types::{Instant, Origin};

@@ -6,7 +6,7 @@ use crate::messages::SensorOffsets;
 use crate::parameters::Parameters;
 use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters as ByNumber;
+use stampfly_param::Parameters as ByNumber;
 use stampfly_services::msp::{Card, Misc, Msp, PidRow, PidTerm, Scale};
 use stampfly_services::{Hands, Helm, Places, Refusal, Request, Requested, Seated, View};
 use stampfly_types::Instant;
