@@ -62,6 +62,8 @@ pub use simulation::{Simulation, SimulationConfig};
 pub use specimen::Specimen;
 /// The traits that simulated sensors and motors implement.
 pub use stampfly_drivers as drivers;
+/// Reads and changes the numbers of a plant by name.
+pub use stampfly_param as param;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;
 pub use world::{Truth, World};

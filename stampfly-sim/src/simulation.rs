@@ -1,10 +1,11 @@
 //! A vehicle ready to fly: the world, the clock and the chips, made from one configuration and one seed.
 
 use crate::conditions::Conditions;
-use crate::plant::{Airframe, Body, ParameterError, ParameterInfo, PlantParameters, Pose, WindConfig};
+use crate::plant::{Airframe, Body, CannotSimulate, PlantParameters, Pose, WindConfig};
 use crate::sensors::Sensors;
 use crate::time::Clock;
 use crate::world::{Truth, World};
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_types::Instant;
 
 /// All that decides a simulation. The same configuration gives the same bits on every machine.
@@ -54,29 +55,36 @@ impl<A: Airframe> SimulationConfig<A> {
         Self { conditions, ..self }
     }
 
-    /// Sets a number of the vehicle or, if it has none of this name, of the conditions.
-    ///
-    /// # Errors
-    /// When there is no such number or the value makes no sense; nothing changes then.
-    pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        match self.plant.set(name, value) {
-            Err(ParameterError::Unknown(_)) => self.conditions.set(name, value),
-            set => set,
-        }
-    }
-
-    /// Every number that [`set`](Self::set) takes.
-    #[must_use]
-    pub fn list(&self) -> Vec<ParameterInfo> {
-        self.plant.list().into_iter().chain(self.conditions.iter()).collect()
-    }
-
     /// Are these numbers together a vehicle that can be simulated?
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        self.plant.under(&self.conditions, self.seed).check()
+    /// [`CannotSimulate`] with the reason.
+    pub fn check(&self) -> Result<(), CannotSimulate> {
+        Airframe::check(&self.plant.under(&self.conditions, self.seed))
+    }
+}
+
+/// The numbers of the vehicle, then those of the conditions.
+impl<A: Airframe> Parameters<f64> for SimulationConfig<A> {
+    fn describe(&self, index: usize) -> Option<ParameterInfo<'_, f64>> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.describe(index),
+            Some(behind) => self.conditions.describe(behind),
+        }
+    }
+
+    fn get(&self, index: usize) -> Option<f64> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.get(index),
+            Some(behind) => self.conditions.get(behind),
+        }
+    }
+
+    fn set(&mut self, index: usize, value: f64) -> Result<(), ParameterError<f64>> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.set(index, value),
+            Some(behind) => self.conditions.set(behind, value),
+        }
     }
 }
 

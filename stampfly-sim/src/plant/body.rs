@@ -3,14 +3,13 @@
 //! [`Body`] is the vehicle in motion, [`Airframe`] the numbers of which it is made. Implement both for a vehicle of another kind. What only
 //! one kind has stays with it: [`World::inspect_as`](crate::World::inspect_as) and [`World::change`](crate::World::change) reach it.
 
-use super::{
-    Battery, GRAVITY, Motion, ParameterError, ParameterInfo, Plant, PlantParameters, Pose, ROTORS, RotorFault,
-};
+use super::{Battery, CannotSimulate, GRAVITY, Motion, Plant, PlantParameters, Pose, ROTORS, RotorFault};
 use super::{Scene, WindConfig};
 use crate::conditions::Conditions;
 use core::any::Any;
 use core::fmt;
 use nalgebra::Vector3;
+use stampfly_param::ParameterTable;
 
 /// What a vehicle does to the sensors that it carries.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +120,7 @@ pub trait Body: Any + fmt::Debug {
 }
 
 /// The numbers of which a body is made, each with a name.
-pub trait Airframe: Clone + fmt::Debug + PartialEq {
+pub trait Airframe: ParameterTable<f64> + Clone + fmt::Debug + PartialEq {
     /// What is made of them.
     type Body: Body;
 
@@ -145,20 +144,11 @@ pub trait Airframe: Clone + fmt::Debug + PartialEq {
         f64::INFINITY
     }
 
-    /// Sets a parameter by name.
-    ///
-    /// # Errors
-    /// When there is no such parameter or the value makes no sense; nothing changes then.
-    fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError>;
-
-    /// Every parameter.
-    fn list(&self) -> Vec<ParameterInfo>;
-
     /// Are these numbers together a vehicle that can be simulated? By default yes.
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    fn check(&self) -> Result<(), ParameterError> {
+    /// [`CannotSimulate`] with the reason.
+    fn check(&self) -> Result<(), CannotSimulate> {
         Ok(())
     }
 }
@@ -237,15 +227,7 @@ impl Airframe for PlantParameters {
         self.full_throttle().lift
     }
 
-    fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        Self::set(self, name, value)
-    }
-
-    fn list(&self) -> Vec<ParameterInfo> {
-        self.iter().collect()
-    }
-
-    fn check(&self) -> Result<(), ParameterError> {
+    fn check(&self) -> Result<(), CannotSimulate> {
         Self::check(self)
     }
 }

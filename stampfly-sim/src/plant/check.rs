@@ -1,13 +1,14 @@
 //! Which numbers together are no quadrotor, or none that can be simulated.
 //!
-//! Each number has a [range](super::ParameterInfo::range), wide enough for vehicles from 10 g to 2 kg. What is possible in a range may be
+//! Each number has a [range](stampfly_param::ParameterInfo), wide enough for vehicles from 10 g to 2 kg. What is possible in a range may be
 //! impossible beside the other numbers: a battery of 1 Ω in a vehicle of 37 g, a foot so hard that one step of the physics is too long for it. A
 //! flight with such numbers ends somehow, and says nothing about any vehicle. So it is refused, with the reason.
 //!
 //! For what somebody types. Code that fills in a [`PlantParameters`] may do without, as a test does that wants a body without weight.
 
-use super::{DT, ParameterError, PlantParameters, ROTORS};
+use super::{DT, PlantParameters, ROTORS};
 use crate::plant::battery::Battery;
+use core::fmt;
 
 /// The least share of the weight that the rotors have to make at full duty. A vehicle that lifts nine tenths of itself is a test of the
 /// flight stack (does it give up?); one whose rotors do not even make half of it is no vehicle: they do not spin up.
@@ -18,6 +19,18 @@ const SPRING: f64 = 1.0;
 const DAMPER: f64 = 1.5;
 /// The rate at which the drag of turning is looked at, rad/s: the end of the gyro's range.
 const RATE: f64 = 35.0;
+
+/// Why numbers, each in its range, are together no vehicle that can be simulated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CannotSimulate(pub String);
+
+impl fmt::Display for CannotSimulate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for CannotSimulate {}
 
 /// What the rotors make at full duty, when they turn steadily.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +83,9 @@ impl PlantParameters {
     /// Are these numbers a quadrotor that can be simulated?
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        let refused = |reason: String| Err(ParameterError::Together(reason));
+    /// [`CannotSimulate`] with the reason.
+    pub fn check(&self) -> Result<(), CannotSimulate> {
+        let refused = |reason: String| Err(CannotSimulate(reason));
         let inertia = [self.inertia_x, self.inertia_y, self.inertia_z];
         let half = 0.5 * inertia.iter().sum::<f64>();
         for (axis, moment) in ["x", "y", "z"].into_iter().zip(inertia) {
@@ -105,7 +118,7 @@ impl PlantParameters {
     }
 
     /// Is one step of the physics short enough for everything that springs back and everything that damps?
-    fn check_step(&self, motor_constant: f64) -> Result<(), ParameterError> {
+    fn check_step(&self, motor_constant: f64) -> Result<(), CannotSimulate> {
         let least = self.inertia_x.min(self.inertia_y);
         let reach = self.foot_offset.max(self.corner_offset);
         // All four feet at once, up and down and about the axis with the least moment of inertia.
@@ -125,7 +138,7 @@ impl PlantParameters {
             ("drag_rotation", self.drag_rotation, DT * self.drag_rotation * RATE / least, DAMPER),
         ];
         match quickest.into_iter().find(|(.., acts, limit)| acts > limit) {
-            Some((name, value, ..)) => Err(ParameterError::Together(format!(
+            Some((name, value, ..)) => Err(CannotSimulate(format!(
                 "{name} {value}: with these masses it acts quicker than a step of the physics, {} ms",
                 1e3 * DT
             ))),

@@ -48,6 +48,7 @@ use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_flight::compact::Chunks;
 use stampfly_flight::{FlightLoop, flight_loop};
 use stampfly_log::ulog::{ParameterValue, Topic};
+use stampfly_param::parameters;
 use stampfly_types::Instant;
 
 /// The ends of everybody outside a vehicle's runnables.
@@ -306,7 +307,7 @@ impl Options {
         }
         for text in &self.plant {
             let (name, value) = assignment(text)?;
-            simulation.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+            parameters::set(simulation, name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
         // In any order, so what they are together is looked at when all are there.
         simulation.check().map_err(|error| format!("--plant {error}"))
