@@ -22,7 +22,6 @@
 //! | [`hil`] | hardware in the loop: the vehicle flies a world at the other end of a line |
 //! | [`mock`] | one runnable by itself, for tests |
 //! | [`newest`] | the newest sample of every topic, shown without its type |
-//! | [`parameters`] | parameters by name |
 //! | [`profile`] | execution times against their budgets |
 //! | [`task`] | the `async` task that flies |
 //! | [`watchdog`] | cuts off motors that are not confirmed in time |
@@ -48,7 +47,6 @@ pub mod log_schema;
 pub mod messages;
 pub mod mock;
 pub mod newest;
-pub mod parameters;
 pub mod profile;
 pub mod recorder;
 #[cfg(feature = "replay")]
@@ -71,6 +69,8 @@ pub use replay::{Replay, ReplayError, ReplayOptions, replay};
 pub use stampfly_bus as bus;
 /// Written to what is stored.
 pub use stampfly_log as log;
+/// Its traits for a vehicle's parameters are in signatures here.
+pub use stampfly_param as param;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;
 pub use watchdog::Watchdog;

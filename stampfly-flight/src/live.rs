@@ -1,69 +1,26 @@
-//! Parameters that change while the vehicle is on: which lines of the activation table are to begin again with them, and when.
+//! Applying changed parameters to a running vehicle: which lines of the activation table take them,
+//! and when.
 //!
-//! People change a configuration that is kept for the next start; [`Told`] finds out what of it is new and tells it. A [`Change`] goes to whoever has the flight
-//! loop, which applies it between two passes, with nothing pending, in one of two ways:
+//! Consoles and radio links change a configuration; a [`ChangeDetector`] finds out what is new in
+//! it. [`Change::detect`] makes a [`Change`] of that, for the owner of the flight loop, which
+//! applies it between two passes, with nothing pending, in one of two ways:
 //!
 //! | the parameter | when | what happens |
 //! |---|---|---|
-//! | may change [in flight](ParameterInfo::in_flight) | at once, armed or not | [`Adjust`]: whoever holds it takes it and keeps its state |
-//! | any other | as soon as the vehicle is disarmed | the lines that hold it begin again, and forget what they have learned |
+//! | may change [in flight](ParameterInfo::in_flight) | at once, armed or not | [`Adjust`]: the runnables that hold it take it and keep their state |
+//! | any other | as soon as the vehicle is disarmed | the lines that hold it begin again, with a new state |
 //!
-//! Lines that hold no changed parameter keep their state. Either way the observer is told, so that a record takes a key frame and is bit for bit from there.
+//! Lines that hold no changed parameter keep their state. Either way the observer is told, so that
+//! a record takes a key frame and is bit for bit from there.
 
 use crate::flight_loop::{FlightLoop, Observer};
-#[cfg(doc)]
-use crate::parameters::ParameterInfo;
-use crate::parameters::Parameters;
 use stampfly_bus::{Schedule, VisitLines};
+#[cfg(doc)]
+use stampfly_param::ParameterInfo;
+use stampfly_param::{ChangeDetector, Parameters};
 
 /// Lines of the activation table, one bit each.
 type Lines = u64;
-
-/// What was told of a configuration so far.
-#[derive(Clone, Debug)]
-pub struct Told<C> {
-    told: C,
-}
-
-impl<C: Parameters + Clone + PartialEq> Told<C> {
-    /// What the vehicle was assembled with.
-    pub const fn new(config: C) -> Self {
-        Self { told: config }
-    }
-
-    /// What was told last: what the vehicle flies with, as soon as it is disarmed.
-    pub const fn last(&self) -> &C {
-        &self.told
-    }
-
-    /// Finds what has changed, whoever has changed it, and hands each parameter to `tell`: its place and its value. `holders` says which lines hold
-    /// the parameter of a name. `None` when nothing has changed that a line holds.
-    pub fn changes<I: IntoIterator<Item = usize>>(
-        &mut self,
-        config: &C,
-        holders: impl Fn(&str) -> I,
-        tell: &mut dyn FnMut(usize, f32),
-    ) -> Option<Change<C>> {
-        if self.told == *config {
-            return None;
-        }
-        let (mut lines, mut adjusts) = (0, false);
-        for index in 0.. {
-            let Some((info, value)) = config.describe(index).zip(config.get(index)) else { break };
-            if self.told.get(index) == Some(value) {
-                continue;
-            }
-            tell(index, value);
-            if info.in_flight {
-                adjusts = true;
-            } else {
-                holders(info.name).into_iter().for_each(|line| lines |= bit(line));
-            }
-        }
-        self.told.clone_from(config);
-        (lines != 0 || adjusts).then(|| Change { lines, adjusts, config: config.clone() })
-    }
-}
 
 /// Beyond the last bit there are no lines.
 #[inline(always)]
@@ -90,6 +47,29 @@ pub struct Change<C> {
     lines: Lines,
     adjusts: bool,
     config: C,
+}
+
+impl<C: Parameters + Clone + PartialEq> Change<C> {
+    /// What is new in this configuration since the detector's last comparison. Passes the number
+    /// and the value of each changed parameter to `tell`, to publish them. `holders` says which
+    /// lines hold the parameter of a name. `None` when nothing has changed that a line holds.
+    pub fn detect<I: IntoIterator<Item = usize>>(
+        detector: &mut ChangeDetector<C>,
+        config: &C,
+        holders: impl Fn(&str) -> I,
+        tell: &mut dyn FnMut(usize, f32),
+    ) -> Option<Self> {
+        let (mut lines, mut adjusts) = (0, false);
+        detector.detect(config, &mut |index, info, value| {
+            tell(index, value);
+            if info.in_flight {
+                adjusts = true;
+            } else {
+                holders(info.name).into_iter().for_each(|line| lines |= bit(line));
+            }
+        });
+        (lines != 0 || adjusts).then(|| Self { lines, adjusts, config: config.clone() })
+    }
 }
 
 impl<C> Change<C> {

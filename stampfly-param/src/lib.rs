@@ -33,23 +33,31 @@
 extern crate std;
 
 pub mod blocking;
+mod detector;
 mod disarmed;
 mod error;
+mod field;
 mod pages;
+pub mod parameters;
 mod ram;
+mod requested;
 pub mod rules;
 mod set;
 mod store;
 mod table;
 mod value;
 
+pub use detector::ChangeDetector;
 pub use disarmed::Disarmed;
 pub use error::{EraseError, LoadError, OpenError, SaveError};
+pub use field::ParameterField;
+pub use parameters::{Number, ParameterError, ParameterInfo, Parameters};
 pub use ram::RamFlash;
+pub use requested::RequestedParameters;
 pub use rules::Conflict;
 pub use set::{ParameterAction, ParameterRequest, ParameterSet, ParameterStatus};
 pub use store::{ParameterStore, key};
-pub use table::{Parameter, ParameterError, ParameterTable};
+pub use table::{Parameter, ParameterTable};
 pub use value::{AnyValue, Kind, LONGEST_NAME, Storable};
 
 /// Its traits are in signatures here.

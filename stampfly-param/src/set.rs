@@ -6,7 +6,7 @@
 //!
 //! Use it for what may change while the vehicle moves. For what needs a vehicle at rest, save it and restart.
 
-use crate::{ParameterError, ParameterTable};
+use crate::{ParameterError, ParameterTable, Parameters, parameters};
 use stampfly_types::{Duration, Instant, message, message_enum};
 
 message_enum! {
@@ -50,15 +50,16 @@ message! {
 ///
 /// ```
 /// use stampfly_param::{ParameterSet, parameters};
-/// use stampfly_types::{Duration, Instant};
+/// use stampfly_param::types::{Duration, Instant};
 ///
 /// parameters! {
 ///     /// A lamp.
-///     pub struct Lamp, where lamp:
-///     /// Light.
-///     light: Light {
-///         /// Brightness.
-///         level = 0.5 in [0.0, 1.0] "1";
+///     pub struct Lamp {
+///         /// Light.
+///         light: Light {
+///             /// Brightness.
+///             level = 0.5 in [0.0, 1.0] "1";
+///         }
 ///     }
 /// }
 ///
@@ -84,19 +85,19 @@ pub struct ParameterSet<P> {
 }
 
 /// The values of the table, without probation.
-impl<P: ParameterTable> Default for ParameterSet<P> {
+impl<P: ParameterTable + Copy + Default> Default for ParameterSet<P> {
     fn default() -> Self {
         Self::holding(P::default(), Duration::ZERO)
     }
 }
 
-impl<P: ParameterTable> ParameterSet<P> {
+impl<P: ParameterTable + Copy> ParameterSet<P> {
     /// A set that starts with these values. A fault within `probation` after a change rolls it back.
     ///
     /// # Errors
-    /// When the values are not [valid](ParameterTable::validate).
+    /// When the values are not [valid](parameters::validate).
     pub fn new(parameters: P, probation: Duration) -> Result<Self, ParameterError> {
-        parameters.validate()?;
+        parameters::validate(&parameters)?;
         Ok(Self::holding(parameters, probation))
     }
 
@@ -111,7 +112,7 @@ impl<P: ParameterTable> ParameterSet<P> {
     /// # Errors
     /// When there is no such parameter, or the value is out of range.
     pub fn set(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
-        P::TABLE.get(index).ok_or(ParameterError::Unknown)?.set(&mut self.candidate, value)
+        self.candidate.set(index, value)
     }
 
     /// Changes the candidate, and applies it at once.
@@ -128,7 +129,7 @@ impl<P: ParameterTable> ParameterSet<P> {
     /// # Errors
     /// When the candidate is not valid. It then starts again from the set in use.
     pub fn apply(&mut self) -> Result<(), ParameterError> {
-        let verdict = self.candidate.validate();
+        let verdict = parameters::validate(&self.candidate);
         match verdict {
             Ok(()) => self.pending = true,
             Err(_) => self.candidate = self.active,
@@ -183,15 +184,16 @@ impl<P: ParameterTable> ParameterSet<P> {
     /// ```
     /// # stampfly_param::parameters! {
     /// #     /// A lamp.
-    /// #     pub struct Lamp, where lamp:
-    /// #     /// Light.
-    /// #     light: Light {
-    /// #         /// Brightness.
-    /// #         level = 0.5 in [0.0, 1.0] "1";
+    /// #     pub struct Lamp {
+    /// #         /// Light.
+    /// #         light: Light {
+    /// #             /// Brightness.
+    /// #             level = 0.5 in [0.0, 1.0] "1";
+    /// #         }
     /// #     }
     /// # }
     /// use stampfly_param::{ParameterAction, ParameterRequest, ParameterSet};
-    /// use stampfly_types::Instant;
+    /// use stampfly_param::types::Instant;
     /// let mut set = ParameterSet::<Lamp>::default();
     /// assert!(set.period(Instant::from_millis(10), true, []).is_some(), "the first time");
     /// assert_eq!(set.period(Instant::from_millis(20), true, []), None);

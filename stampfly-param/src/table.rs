@@ -1,146 +1,183 @@
-//! The parameters of a vehicle as a table: name, default, range and unit in one line each.
+//! The parameters of a vehicle as a table, one line each: name, range, unit and meaning.
 //!
-//! [`parameters!`](crate::parameters!) makes one plain struct per group, for the component that is configured by it, and one
-//! message of all groups, so that the set in use is a topic: logged, replayed, and with the table's values as its default.
-//! Names are `group.name`. To change values of a running vehicle use a [`ParameterSet`](crate::ParameterSet), to keep them
-//! over a power cut a [`ParameterStore`](crate::ParameterStore).
+//! [`parameters!`](crate::parameters!) declares it in one of two forms:
 //!
-//! Only `f32`. A choice between two components is not a number: make it an enumeration of the vehicle's configuration.
+//! | form | values are | use it when |
+//! |---|---|---|
+//! | `struct Name { group: Group { … } }` | fields that the macro declares, `f32` | parameters are all there is to configure |
+//! | `impl Config { … }` | fields of a struct of yours | the components already have configurations |
+//!
+//! Either way the struct is a [`ParameterTable`], and with it [`Parameters`].
 
-use crate::rules::{self, Conflict, Rule};
-use core::fmt;
+use crate::rules::{self, Rule};
+use crate::{Number, ParameterError, ParameterInfo, Parameters};
 
-/// One parameter of the set `P`: a line of the table.
+/// One parameter of a configuration `C`: a line of its table.
 #[derive(Clone, Copy, Debug)]
-pub struct Parameter<P> {
-    /// `group.name`.
-    pub name: &'static str,
-    /// Smallest value accepted.
-    pub min: f32,
-    /// Largest value accepted.
-    pub max: f32,
-    /// SI unit, `"1"` where there is none.
-    pub unit: &'static str,
-    /// What it does: its documentation in the table.
-    pub meaning: &'static str,
+pub struct Parameter<C, N = f32> {
+    /// Name, range, unit, meaning.
+    pub info: ParameterInfo<'static, N>,
     #[doc(hidden)]
-    pub __field: fn(&mut P) -> &mut f32,
+    pub __get: fn(&C) -> N,
+    #[doc(hidden)]
+    pub __set: fn(&mut C, N) -> Option<()>,
 }
 
-/// Why parameters were refused. Nothing has changed then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ParameterError {
-    /// There is no such parameter.
-    Unknown,
-    /// The value is outside its range, or not a number.
-    OutOfRange,
-    /// Each value is in its range, but with these two the vehicle cannot do its work.
-    Conflict(Conflict),
-}
-
-impl fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown => f.write_str("there is no such parameter"),
-            Self::OutOfRange => f.write_str("the value is out of range"),
-            Self::Conflict(conflict) => conflict.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for ParameterError {}
-
-impl<P: Copy> Parameter<P> {
-    /// The value in this set.
+impl<C, N: Number> Parameter<C, N> {
+    /// The value in this configuration.
     #[must_use]
-    pub fn get(&self, parameters: &P) -> f32 {
-        *(self.__field)(&mut { *parameters })
+    pub fn get(&self, config: &C) -> N {
+        (self.__get)(config)
     }
 
-    /// Changes the value.
+    /// Changes the value in this configuration, without looking at other parameters.
     ///
     /// # Errors
-    /// [`ParameterError::OutOfRange`].
-    pub fn set(&self, parameters: &mut P, value: f32) -> Result<(), ParameterError> {
-        if !(self.min..=self.max).contains(&value) {
-            return Err(ParameterError::OutOfRange);
-        }
-        *(self.__field)(parameters) = value;
-        Ok(())
+    /// [`ParameterError::OutOfRange`], also for a number that the field's type does not have.
+    pub fn set(&self, config: &mut C, value: N) -> Result<(), ParameterError<N>> {
+        let in_range = self.info.accepts(value).then(|| (self.__set)(config, value)).flatten();
+        in_range.ok_or(self.info.out_of_range())
     }
 }
 
-/// A set of parameters with its table. Implemented by [`parameters!`](crate::parameters!).
-pub trait ParameterTable: Copy + Default + 'static {
-    /// Every parameter, in the order it was declared in. The place is its number in a
-    /// [`ParameterRequest`](crate::ParameterRequest).
-    const TABLE: &'static [Parameter<Self>];
+/// A configuration with a table of its parameters. Implemented by [`parameters!`](crate::parameters!).
+///
+/// ```
+/// use stampfly_param::{ParameterTable, parameters};
+///
+/// struct Drive { gain: f32, reversed: bool }
+///
+/// parameters! {
+///     impl Drive {
+///         /// Duty per metre.
+///         gain in [0.0, 2.0] "1/m";
+///         /// 1: turns the other way.
+///         reversed in [0.0, 1.0] "1";
+///     }
+/// }
+///
+/// let names: Vec<_> = Drive::TABLE.iter().map(|parameter| parameter.info.name).collect();
+/// assert_eq!(names, ["gain", "reversed"]);
+/// ```
+pub trait ParameterTable<N: Number = f32>: Sized + 'static {
+    /// Every parameter. Its place here is its number everywhere else.
+    const TABLE: &'static [Parameter<Self, N>];
 
-    /// Which values, each being in its range, cannot be together.
+    /// Values that must not be combined though each is in its range.
     const RULES: &'static [Rule<Self>];
 
     /// The parameter of this name.
     ///
     /// # Errors
     /// [`ParameterError::Unknown`].
-    fn find(name: &str) -> Result<&'static Parameter<Self>, ParameterError> {
-        Self::TABLE.iter().find(|parameter| parameter.name == name).ok_or(ParameterError::Unknown)
-    }
-
-    /// Checks the set as a whole.
-    ///
-    /// # Errors
-    /// When a value is outside its range, or two break a rule.
-    fn validate(&self) -> Result<(), ParameterError> {
-        if !Self::TABLE.iter().all(|row| (row.min..=row.max).contains(&row.get(self))) {
-            return Err(ParameterError::OutOfRange);
-        }
-        rules::check(Self::RULES, self, None).map_err(ParameterError::Conflict)
+    fn find(name: &str) -> Result<&'static Parameter<Self, N>, ParameterError<N>> {
+        Self::TABLE.iter().find(|parameter| parameter.info.name == name).ok_or(ParameterError::Unknown)
     }
 }
 
-/// Declares the parameters of a vehicle.
+impl<N: Number, C: ParameterTable<N>> Parameters<N> for C {
+    fn describe(&self, index: usize) -> Option<ParameterInfo<'_, N>> {
+        C::TABLE.get(index).map(|parameter| parameter.info)
+    }
+
+    fn get(&self, index: usize) -> Option<N> {
+        C::TABLE.get(index).map(|parameter| parameter.get(self))
+    }
+
+    fn set(&mut self, index: usize, value: N) -> Result<(), ParameterError<N>> {
+        C::TABLE.get(index).ok_or(ParameterError::Unknown)?.set(self, value)
+    }
+
+    fn check(&self, about: Option<usize>) -> Result<(), ParameterError<N>> {
+        let name = about.map(|index| C::TABLE.get(index).map_or("", |parameter| parameter.info.name));
+        Ok(rules::check(C::RULES, self, name)?)
+    }
+}
+
+/// Declares the parameters of a vehicle: a table with one line each.
+///
+/// # Structs made by the macro
+/// A line is `name = default in [min, max] "unit";` below its meaning. Lines stand in groups; each group becomes a struct,
+/// for the component that it configures, and all groups together a [message](crate::types::message!), so that the parameters in
+/// use can be a topic. Names are `group.name`. Rules follow behind `where`, as [`rules!`](crate::rules!) has them.
 ///
 /// ```
-/// use stampfly_param::{ParameterError, ParameterTable, parameters};
+/// use stampfly_param::parameters;
 ///
 /// parameters! {
 ///     /// The parameters of a boat.
-///     pub struct BoatParameters, where p:
-///     "motor.idle" "motor.full" p.motor.idle < p.motor.full => "the throttle would do nothing";
-///
-///     /// Motor.
-///     motor: MotorParameters {
-///         /// Duty at full throttle.
-///         full = 0.9 in [0.1, 1.0] "1";
-///         /// Duty at rest.
-///         idle = 0.05 in [0.0, 0.5] "1";
+///     pub struct BoatParameters {
+///         /// Motor.
+///         motor: MotorParameters {
+///             /// Duty at full throttle.
+///             full = 0.9 in [0.1, 1.0] "1";
+///             /// Duty at rest.
+///             idle = 0.05 in [0.0, 0.5] "1";
+///         }
+///         /// Rudder.
+///         rudder: RudderParameters {
+///             /// Angle at the stop.
+///             max_angle = 0.5 in [0.1, 1.0] "rad";
+///         }
 ///     }
-///     /// Rudder.
-///     rudder: RudderParameters {
-///         /// Angle at the stop.
-///         max_angle = 0.5 in [0.1, 1.0] "rad";
+///     where p:
+///     "motor.idle" "motor.full" p.motor.idle < p.motor.full => "the throttle would do nothing";
+/// }
+///
+/// let mut boat = BoatParameters::default();
+/// assert_eq!(boat.motor.full, 0.9);
+/// parameters::set(&mut boat, "motor.full", 0.4)?;
+/// let refused = parameters::set(&mut boat, "motor.idle", 0.5).unwrap_err();
+/// assert_eq!(refused.to_string(), "motor.idle with motor.full: the throttle would do nothing");
+/// assert_eq!(boat.motor, MotorParameters { full: 0.4, idle: 0.05 });
+/// # Ok::<(), stampfly_param::ParameterError>(())
+/// ```
+///
+/// # A struct of your own
+/// A line is `"name" = field in [min, max] "unit";` below its meaning. Without a name the parameter is called like the path to
+/// its field. A field is a [`ParameterField`](crate::ParameterField): a number, yes or no, a duration or an enumeration. A line
+/// that ends in `, in_flight` marks a parameter that may change [in flight](crate::ParameterInfo::in_flight). Rules follow behind
+/// `where`, written there or as a constant. A struct of `f64` says `impl Config: f64`.
+///
+/// ```
+/// use stampfly_param::types::Duration;
+/// use stampfly_param::{Parameters, parameters};
+///
+/// #[derive(Default)]
+/// struct Drive { gain: f32, ramp: Duration }
+/// #[derive(Default)]
+/// struct Boat { drive: Drive, keel: f32 }
+///
+/// parameters! {
+///     impl Boat {
+///         /// Duty per metre.
+///         drive.gain in [0.0, 2.0] "1/m", in_flight;
+///         /// Time to full duty.
+///         drive.ramp in [0.0, 10.0] "s";
+///         /// Depth below the water.
+///         "keel.depth" = keel in [0.0, 2.0] "m";
 ///     }
 /// }
 ///
-/// let mut parameters = BoatParameters::default();
-/// assert_eq!(parameters.motor.full, 0.9);
-/// BoatParameters::find("motor.idle")?.set(&mut parameters, 0.5)?;
-/// BoatParameters::find("motor.full")?.set(&mut parameters, 0.4)?;
-/// let refused = parameters.validate().unwrap_err();
-/// assert_eq!(refused.to_string(), "motor.idle with motor.full: the throttle would do nothing");
-/// assert_eq!(BoatParameters::find("rudder.max_angle")?.set(&mut parameters, f32::NAN), Err(ParameterError::OutOfRange));
-/// # Ok::<(), ParameterError>(())
+/// let mut boat = Boat::default();
+/// parameters::set(&mut boat, "drive.ramp", 1.5)?;
+/// assert_eq!(boat.drive.ramp, Duration::from_millis(1_500));
+/// assert!(boat.describe(0).unwrap().in_flight);
+/// assert_eq!(boat.describe(2).unwrap().name, "keel.depth");
+/// # Ok::<(), stampfly_param::ParameterError>(())
 /// ```
 #[macro_export]
 macro_rules! parameters {
     (
-        $(#[$set_doc:meta])* $vis:vis struct $Set:ident, where $set:ident:
-        $($first:literal $second:literal $holds:expr => $reason:literal;)*
-        $($(#[$group_doc:meta])* $group:ident: $Group:ident {
-            $($(#[doc = $doc:literal])* $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal;)+
-        })+
+        $(#[$set_doc:meta])* $vis:vis struct $Set:ident {
+            $($(#[$group_doc:meta])* $group:ident: $Group:ident {
+                $(
+                    $(#[doc = $doc:literal])*
+                    $name:ident = $default:literal in [$min:literal, $max:literal] $unit:literal $(, $in_flight:ident)?;
+                )+
+            })+
+        }
+        $(where $($rules:tt)+)?
     ) => {
         $(
             $(#[$group_doc])*
@@ -174,14 +211,51 @@ macro_rules! parameters {
             $vis struct $Set { $($(#[$group_doc])* $group: $Group ["SI"]),+ }
         }
 
-        impl $crate::ParameterTable for $Set {
-            const TABLE: &'static [$crate::Parameter<Self>] = &[$($($crate::Parameter {
-                name: concat!(stringify!($group), ".", stringify!($name)),
-                min: $min, max: $max, unit: $unit, meaning: concat!($($doc),*).trim_ascii(), __field: |parameters| &mut parameters.$group.$name,
-            }),+),+];
-
-            const RULES: &'static [$crate::rules::Rule<Self>] =
-                $crate::rules! { $set: $($first $second $holds => $reason;)* };
+        $crate::parameters! {
+            impl $Set {
+                $($($(#[doc = $doc])* $group.$name in [$min, $max] $unit $(, $in_flight)?;)+)+
+            }
+            $(where $($rules)+)?
         }
     };
+    (
+        impl $Config:ty $(: $Number:ty)? {
+            $(
+                $(#[doc = $doc:literal])*
+                $($name:literal =)? $field:ident $(.$inner:ident)*
+                in [$min:literal, $max:literal] $unit:literal $(, $in_flight:ident)?;
+            )+
+        }
+        $(where $($rules:tt)+)?
+    ) => {
+        impl $crate::ParameterTable<$crate::parameters!(@number $($Number)?)> for $Config {
+            const TABLE: &'static [$crate::Parameter<Self, $crate::parameters!(@number $($Number)?)>] =
+                &[$($crate::Parameter {
+                    info: $crate::ParameterInfo {
+                        name: $crate::parameters!(@name $($name)?, $field $(.$inner)*),
+                        min: $min,
+                        max: $max,
+                        unit: $unit,
+                        meaning: concat!($($doc),*).trim_ascii(),
+                        in_flight: $crate::parameters!(@in_flight $($in_flight)?),
+                    },
+                    __get: |config| $crate::ParameterField::number(config.$field $(.$inner)*),
+                    __set: |config, number| {
+                        config.$field $(.$inner)* = $crate::ParameterField::from_number(number)?;
+                        Some(())
+                    },
+                }),+];
+
+            const RULES: &'static [$crate::rules::Rule<Self>] = $crate::parameters!(@rules $($($rules)+)?);
+        }
+    };
+    (@number) => { f32 };
+    (@number $Number:ty) => { $Number };
+    (@name $name:literal, $($field:tt)+) => { $name };
+    (@name , $field:ident $(.$inner:ident)*) => { concat!(stringify!($field) $(, ".", stringify!($inner))*) };
+    (@in_flight) => { false };
+    (@in_flight in_flight) => { true };
+    (@rules) => { &[] };
+    (@rules $config:ident: $($rules:tt)+) => { $crate::rules! { $config: $($rules)+ } };
+    (@rules $rules:path;) => { $rules };
 }

@@ -2,9 +2,9 @@
 //!
 //! The loop is the firmware's, [`Ports`]; only [`Ends`] are others. It says where they are, and serves for so many seconds; without a number, for none.
 
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::Key;
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_services::mavlink::Identity;
 use stampfly_services::network::{Client, Ends, Heard, Ports};
 use stampfly_services::{Cockpit, Connection, Places, Refusal, Samples, Seat, View};

@@ -9,7 +9,7 @@ use crate::helm::Told;
 use crate::lease::is_sane;
 use crate::refusal::{Connection, Refusal, Seat};
 use crate::view::View;
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_types::Instant;
 use stampfly_types::Origin;
 use stampfly_types::messages::{CalibrationKind, CalibrationReport, GuidedCommand, GuidedKind, PilotInput};

@@ -7,8 +7,8 @@
 use core::fmt;
 use heapless::{Deque, String};
 use stampfly_flight::console::{Piece, Request, Vehicle, answer};
-use stampfly_flight::parameters;
 use stampfly_link::secure::Payload;
+use stampfly_param::parameters;
 use stampfly_types::Instant;
 
 /// Bytes of a line.

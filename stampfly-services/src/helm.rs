@@ -12,7 +12,7 @@ use crate::refusal::{Connection, Refusal, Seat};
 use crate::stick_source::{StickSource, Verdict};
 use crate::view::View;
 use core::fmt;
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_types::messages::{CalibrationKind, FlightStatus, GuidedCommand, GuidedKind, PilotInput};
 use stampfly_types::{Duration, Instant, Origin};
 

@@ -7,7 +7,6 @@
 //! | [`helm`] | the part of a cockpit that is the same for every vehicle |
 //! | [`desk`] | a station's questions for parameters, and its lines of the console |
 //! | [`radio_desk`] | the same over the secure link, and topics that a station wants to see |
-//! | [`Requested`] | parameters of a vehicle that takes requests for them |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`watches`] | the topics that a station wants to see, and when each is due |
 //! | [`lease`] | one seat at a time commands: a page, a program, a station with the key, a transmitter |
@@ -46,7 +45,6 @@ pub mod msp;
 pub mod network;
 pub mod radio_desk;
 mod refusal;
-mod requested;
 mod stick_source;
 pub mod tape;
 pub mod telemetry;
@@ -62,7 +60,6 @@ pub use helm::{Asked, Hands, Helm, Pass, Passed, Seated, Told};
 pub use lease::Lease;
 pub use radio_desk::RadioDesk;
 pub use refusal::{Connection, Refusal, Seat};
-pub use requested::Requested;
 pub use tape::Tape;
 pub use telemetry::Telemetry;
 pub use tello::Tello;
@@ -71,5 +68,7 @@ pub use view::{Places, Samples, View};
 
 /// The wire formats.
 pub use stampfly_link as link;
+/// Its trait for a vehicle's parameters is in signatures here.
+pub use stampfly_param as param;
 /// Messages, time, vectors: the words that signatures here are written in.
 pub use stampfly_types as types;

@@ -12,8 +12,8 @@
 use crate::cockpit::{Cockpit, Request};
 use core::f32::consts::PI;
 use heapless::Vec;
-use stampfly_flight::parameters::{self, Parameters};
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame};
+use stampfly_param::{Parameters, parameters};
 use stampfly_types::messages::FlightStatus;
 use stampfly_types::{Duration, Instant, frame};
 

@@ -1,6 +1,7 @@
 //! Who asks a vehicle for something, and why it does not get there.
 
 use core::fmt;
+use stampfly_param::ParameterError;
 
 /// Number of a connection: a stream, an address of datagrams, a cable. Two that are there at the
 /// same time have different ones.
@@ -89,3 +90,14 @@ impl fmt::Display for Refusal {
 }
 
 impl core::error::Error for Refusal {}
+
+/// For requests that change parameters.
+impl From<ParameterError> for Refusal {
+    fn from(error: ParameterError) -> Self {
+        match error {
+            ParameterError::Busy => Self::Full,
+            ParameterError::Unknown => Self::Unsupported,
+            _ => Self::Range,
+        }
+    }
+}

@@ -11,14 +11,13 @@
 //! ```
 //! use core::cell::RefCell;
 //! use stampfly_flight::newest::{NewestSamples, longest_message};
-//! use stampfly_flight::parameters::Parameters;
+//! use stampfly_param::{Parameters, RequestedParameters};
 //! use stampfly_services::{Hands, Refusal, Request};
 //! use stampfly_services::link::mavlink::dialects::common::MavType;
 //! use stampfly_sim::fault::Injector;
 //! use stampfly_sim::ground::{About, Served};
 //! use stampfly_sim::vehicle::{Client, Heard, Link, Live, PortSpec, Ports};
 //! use stampfly_types::{Duration, Instant, messages::{GuidedCommand, PilotInput}};
-//! # use stampfly_services::Requested;
 //! # use std::sync::Arc;
 //! # mod topics {
 //! #     use stampfly_types::messages::FlightStatus;
@@ -30,11 +29,12 @@
 //! # }
 //! # stampfly_param::parameters! {
 //! #     /// A buoy.
-//! #     pub struct Numbers, where buoy:
-//! #     /// Its lamp.
-//! #     lamp: Lamp {
-//! #         /// Brightness.
-//! #         level = 0.5 in [0.0, 1.0] "1";
+//! #     pub struct Numbers {
+//! #         /// Its lamp.
+//! #         lamp: Lamp {
+//! #             /// Brightness.
+//! #             level = 0.5 in [0.0, 1.0] "1";
+//! #         }
 //! #     }
 //! # }
 //! # #[derive(Debug)]
@@ -45,7 +45,7 @@
 //! #     fn are_closed(&self) -> bool { true }
 //! # }
 //! /// A buoy with a lamp: it has parameters and accepts no commands.
-//! struct Buoy(Requested<Numbers, 8>);
+//! struct Buoy(RequestedParameters<Numbers, 8>);
 //!
 //! impl Hands for Buoy {
 //!     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
@@ -70,7 +70,7 @@
 //! # let live = Live { ports: Arc::new(Closed), number: 0, limit: Duration::from_secs(1), speed: None };
 //! # let newest = RefCell::new(NewestSamples::<{ topics::COUNT }, { longest_message(&topics::TOPICS) }>::new());
 //! # let none = Injector::new(Instant::ZERO, &[]);
-//! let mut served = Served::new(&ABOUT, &live, &none, Buoy(Requested::new(Numbers::default())), &newest);
+//! let mut served = Served::new(&ABOUT, &live, &none, Buoy(RequestedParameters::new(Numbers::default())), &newest);
 //! let page = Client { port: 0, address: ([127, 0, 0, 1], 1).into() };
 //! let mut ask = |text: &str| {
 //!     let mut answer = String::new();
@@ -90,7 +90,7 @@ use crate::vehicle::{Client, Heard, Link, Live, PortSpec, Ports, Put, Speed};
 use core::cell::RefCell;
 use core::net::IpAddr;
 use stampfly_bus::TopicInfo;
-use stampfly_flight::parameters;
+use stampfly_param::parameters;
 use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::link::mavlink::signing::SigningKey;

@@ -67,6 +67,8 @@ pub use simulation::{Simulation, SimulationConfig};
 pub use specimen::Specimen;
 /// The traits that simulated sensors and motors implement.
 pub use stampfly_drivers as drivers;
+/// Reads and changes the parameters of a plant by name.
+pub use stampfly_param as param;
 /// Messages, instants, durations and vectors used in the signatures of this crate.
 pub use stampfly_types as types;
 pub use world::{Truth, World};

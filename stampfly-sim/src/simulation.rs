@@ -1,10 +1,11 @@
 //! Builds a simulated vehicle from one configuration and one seed.
 
 use crate::conditions::Conditions;
-use crate::plant::{Airframe, Body, ParameterError, ParameterInfo, PlantParameters, Pose, WindConfig};
+use crate::plant::{Airframe, Body, CannotSimulate, PlantParameters, Pose, WindConfig};
 use crate::sensors::Sensors;
 use crate::time::Clock;
 use crate::world::{Truth, World};
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_types::Instant;
 
 /// Configuration of a simulation. The same configuration gives the same bits on every machine.
@@ -56,30 +57,36 @@ impl<A: Airframe> SimulationConfig<A> {
         Self { conditions, ..self }
     }
 
-    /// Sets a parameter of the airframe or, if the airframe has none of this name, of the
-    /// conditions.
-    ///
-    /// # Errors
-    /// If no parameter has this name or the value is out of range; nothing changes then.
-    pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        match self.plant.set(name, value) {
-            Err(ParameterError::Unknown(_)) => self.conditions.set(name, value),
-            set => set,
-        }
-    }
-
-    /// All parameters that [`set`](Self::set) accepts.
-    #[must_use]
-    pub fn list(&self) -> Vec<ParameterInfo> {
-        self.plant.list().into_iter().chain(self.conditions.iter()).collect()
-    }
-
     /// Checks that the parameters together describe a vehicle that can be simulated.
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        self.plant.under(&self.conditions, self.seed).check()
+    /// [`CannotSimulate`] with the reason.
+    pub fn check(&self) -> Result<(), CannotSimulate> {
+        Airframe::check(&self.plant.under(&self.conditions, self.seed))
+    }
+}
+
+/// The numbers of the vehicle, then those of the conditions.
+impl<A: Airframe> Parameters<f64> for SimulationConfig<A> {
+    fn describe(&self, index: usize) -> Option<ParameterInfo<'_, f64>> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.describe(index),
+            Some(behind) => self.conditions.describe(behind),
+        }
+    }
+
+    fn get(&self, index: usize) -> Option<f64> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.get(index),
+            Some(behind) => self.conditions.get(behind),
+        }
+    }
+
+    fn set(&mut self, index: usize, value: f64) -> Result<(), ParameterError<f64>> {
+        match index.checked_sub(A::TABLE.len()) {
+            None => self.plant.set(index, value),
+            Some(behind) => self.conditions.set(behind, value),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use stampfly_board::console::{Command, Console, Newest, Profile};
 use stampfly_board::topics::{Id, TOPICS};
 use stampfly_board::{VehicleConfig, schedule};
 use stampfly_flight::console::{LineEditor, Request, SensorLine, answer};
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_types::messages::{FlightMode, FlightPhase, FlightStatus};
 use stampfly_types::{Instant, Message};
 

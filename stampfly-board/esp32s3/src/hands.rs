@@ -6,7 +6,7 @@ use stampfly_board::console::Command;
 use stampfly_board::link::Link;
 use stampfly_board::topics::ConsoleEnds;
 use stampfly_flight::console::calibrate::Calibrate;
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_services::{Hands as Vehicle, Refusal, Request};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};

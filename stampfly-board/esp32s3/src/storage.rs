@@ -19,10 +19,10 @@ use stampfly_board::messages::StorageBusy;
 use stampfly_board::parameters::{self, KEY, PEER};
 use stampfly_board::topics::StorageBusyTx;
 use stampfly_drivers::Timebase;
-use stampfly_flight::parameters::{Parameters, settle};
 use stampfly_link::Address;
 use stampfly_link::secure::Key;
-use stampfly_param::{Disarmed, EraseError, ParameterStore, SaveError};
+use stampfly_param::parameters::settle;
+use stampfly_param::{Disarmed, EraseError, ParameterStore, Parameters, SaveError};
 #[cfg(feature = "wifi")]
 use stampfly_services::association::{Credentials, NAMES, RECORD};
 #[cfg(feature = "wifi")]

@@ -51,7 +51,6 @@ use crate::schedule::Runnables;
 use crate::topics::Id;
 use mission::Mission;
 use sensing::Sensing;
-use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_log::ulog::{ParameterValue, Topic};
 use stampfly_sim::Truth;
 use stampfly_sim::fault::{FaultKind, Moment};
@@ -96,11 +95,7 @@ impl Vehicle for StampFly {
             setup = setup.flown_by(live.clone());
         }
         options.change(&mut setup.simulation)?;
-        // In any order, so combinations are looked at when all are there.
-        for (name, value) in options.parameters()? {
-            set_alone(&mut setup.vehicle, name, value).map_err(|error| format!("--param {name}: {error}"))?;
-        }
-        setup.vehicle.check(None).map_err(|error| format!("--param {error}"))?;
+        vehicle::table::change(&mut setup.vehicle, options)?;
         if let Some(typed) = &options.sticks {
             let sticks = sticks_of(typed, options, &setup)?;
             setup = setup.playing(sticks);
@@ -164,29 +159,24 @@ impl Vehicle for StampFly {
     }
 
     fn parameters(config: &VehicleConfig) -> Vec<Setting> {
-        let settings = crate::parameters::all().enumerate().filter_map(|(index, info)| {
-            let value = f64::from(config.get(index)?);
-            Some(Setting { name: info.name, value, unit: info.unit, meaning: info.meaning })
-        });
         // No parameter, but what a log needs to be replayed.
         let meaning = "1: flies on where a protection stops the motors in the air";
         let flies_on = Setting { name: FLIES_ON, value: 1.0, unit: "1", meaning };
-        settings.chain(config.flies_on.then_some(flies_on)).collect()
+        vehicle::table::settings(config).into_iter().chain(config.flies_on.then_some(flies_on)).collect()
     }
 
     fn set_parameter(config: &mut VehicleConfig, name: &str, value: ParameterValue) -> Result<(), SetupError> {
-        let ParameterValue::Float(value) = value else { return Err(format!("{name}: not a float")) };
-        if name == FLIES_ON {
-            config.flies_on = value != 0.0;
-            return Ok(());
+        match value {
+            ParameterValue::Float(value) if name == FLIES_ON => {
+                config.flies_on = value != 0.0;
+                Ok(())
+            }
+            value => vehicle::table::set(config, name, value),
         }
-        // A log has what was flown, whatever may fly today.
-        set_alone(config, name, value).map_err(|error| format!("{name}: {error}"))
     }
 
     fn parameter_range(name: &str) -> Option<[f64; 2]> {
-        let info = crate::parameters::all().find(|info| info.name == name)?;
-        Some([info.min, info.max].map(f64::from))
+        vehicle::table::range::<VehicleConfig>(name)
     }
 
     fn has_same_components(one: &VehicleConfig, other: &VehicleConfig) -> bool {
@@ -227,12 +217,6 @@ impl Vehicle for StampFly {
     fn plant(setup: &Setup) -> Vec<Setting> {
         vehicle::table::simulation(&setup.simulation)
     }
-}
-
-/// Sets a parameter of this name, whatever the others are.
-fn set_alone(config: &mut VehicleConfig, name: &str, value: f32) -> Result<(), ParameterError> {
-    let index = parameters::find(config, name)?;
-    parameters::set_alone(config, index, value)
 }
 
 /// The stick file that is typed, for a vehicle that is set up like this.

@@ -5,8 +5,9 @@ use crate::VehicleConfig;
 use crate::messages::ParameterChange;
 use crate::parameters;
 use crate::topics::ConsoleEnds;
-use stampfly_flight::live::{Change, Told};
-use stampfly_flight::parameters::{ParameterError, Parameters, set_alone};
+use stampfly_flight::live::Change;
+use stampfly_param::parameters::set_alone;
+use stampfly_param::{ChangeDetector, ParameterError, Parameters};
 use stampfly_types::Instant;
 use std::cell::RefCell;
 
@@ -16,7 +17,7 @@ pub(super) type Waiting = RefCell<Option<Change<VehicleConfig>>>;
 /// Parameters of a mission's flight.
 pub struct Settings<'b> {
     config: VehicleConfig,
-    told: Told<VehicleConfig>,
+    detector: ChangeDetector<VehicleConfig>,
     console: ConsoleEnds<'b>,
     waiting: &'b Waiting,
 }
@@ -25,7 +26,7 @@ impl<'b> Settings<'b> {
     /// Of a vehicle that was assembled with this configuration. Changes are told at this console,
     /// and wait there.
     pub(super) fn new(config: &VehicleConfig, console: ConsoleEnds<'b>, waiting: &'b Waiting) -> Self {
-        Self { config: config.clone(), told: Told::new(config.clone()), console, waiting }
+        Self { config: config.clone(), detector: ChangeDetector::new(config.clone()), console, waiting }
     }
 
     /// Changes the parameter at this place of the table.
@@ -38,7 +39,7 @@ impl<'b> Settings<'b> {
         set_alone(&mut config, index, value)?;
         config.check(Some(index))?;
         self.config = config;
-        tell(now, &mut self.told, &self.config, &mut self.console, self.waiting);
+        tell(now, &mut self.detector, &self.config, &mut self.console, self.waiting);
         Ok(())
     }
 }
@@ -46,13 +47,13 @@ impl<'b> Settings<'b> {
 /// Tells what of a configuration is new, and lets it wait for the flight loop.
 pub(super) fn tell(
     now: Instant,
-    told: &mut Told<VehicleConfig>,
+    detector: &mut ChangeDetector<VehicleConfig>,
     config: &VehicleConfig,
     console: &mut ConsoleEnds<'_>,
     waiting: &Waiting,
 ) {
     let lines = |name: &str| parameters::holders(name).iter().map(|line| *line as usize);
-    let change = told.changes(config, lines, &mut |index, value| {
+    let change = Change::detect(detector, config, lines, &mut |index, value| {
         console.parameter_change.publish(now, &ParameterChange { index: index as u32, value });
     });
     if let Some(change) = change {

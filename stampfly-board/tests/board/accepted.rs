@@ -7,7 +7,7 @@ use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_board::topics::Id;
 use stampfly_board::{VehicleConfig, parameters};
 use stampfly_flight::Observer;
-use stampfly_flight::parameters::{ParameterInfo, Parameters};
+use stampfly_param::{ParameterInfo, Parameters};
 use stampfly_sim::Noise;
 use stampfly_sim::vehicle::{Vehicle, Verdict, Witness};
 use stampfly_types::messages::{ArmBlocks, FlightStatus};

@@ -3,7 +3,8 @@
 use stampfly_board::schedule::Runnables;
 use stampfly_board::{VehicleConfig, topics};
 use stampfly_bus::Band;
-use stampfly_flight::{Assembled, parameters};
+use stampfly_flight::Assembled;
+use stampfly_param::parameters;
 use stampfly_types::Instant;
 use stampfly_types::messages::{Alerts, TofData};
 

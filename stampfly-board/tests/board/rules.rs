@@ -2,7 +2,8 @@
 
 use stampfly_board::rules::RULES;
 use stampfly_board::{VehicleConfig, parameters};
-use stampfly_flight::parameters::{ParameterError, Parameters, set, settle};
+use stampfly_param::parameters::{set, settle};
+use stampfly_param::{Conflict, ParameterError, Parameters};
 
 /// Rule by rule: a value of each parameter that goes with the other just so, and one of the first that does not.
 const BORDERS: &[([&str; 2], [f32; 2], f32)] = &[
@@ -57,7 +58,7 @@ fn every_rule_refuses_beyond_its_border_and_passes_at_it() {
         let mut config = with(names, passes);
         let before = config.clone();
         match set(&mut config, names[0], refused) {
-            Err(ParameterError::Conflict { parameters, reason }) => {
+            Err(ParameterError::Conflict(Conflict { parameters, reason })) => {
                 assert!(parameters.contains(&names[0]) && reason.len() > 10, "{names:?}: {parameters:?} {reason}");
             }
             other => panic!("{names:?} {refused}: {other:?}"),

@@ -1,9 +1,9 @@
 //! The head of the log that a recording is read out as.
 
 use crate::log_schema::LogSchema;
-use crate::parameters::Parameters;
 use stampfly_bus::Schedule;
 use stampfly_log::ulog::{Definitions, Level, ParameterValue, Sink, WriteError, Writer};
+use stampfly_param::Parameters;
 use stampfly_types::Instant;
 
 /// Starts the log of a flight with these parameters: name of the vehicle, parameters, every topic, and a line of text
@@ -13,7 +13,7 @@ use stampfly_types::Instant;
 /// # mod rover { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/flight/common/mod.rs")); }
 /// use rover::Rover; // the rover of `tests/flight/common`
 /// use stampfly_flight::black_box::open;
-/// use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+/// use stampfly_flight::param::{ParameterError, ParameterInfo, Parameters};
 /// use stampfly_log::ulog::Ram;
 /// use stampfly_types::Instant;
 ///

@@ -4,9 +4,9 @@ use super::command::{COMMANDS, Command};
 use super::vehicle::{SensorLine, Vehicle};
 use crate::doctor;
 use crate::newest::ShownSample;
-use crate::parameters::{self, ParameterInfo, Parameters};
 use crate::profile::HEADING;
 use core::fmt::{self, Write};
+use stampfly_param::{ParameterInfo, Parameters, parameters};
 use stampfly_types::Instant;
 
 /// What the board is to do after the reply. `R` is the vehicle's own.
@@ -37,7 +37,7 @@ pub enum Request<R> {
 /// use core::fmt;
 /// use stampfly_bus::TopicInfo;
 /// use stampfly_flight::console::{CommandError, Request, SensorLine, Vehicle, answer};
-/// use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+/// use stampfly_flight::param::{ParameterError, ParameterInfo, Parameters};
 /// use stampfly_flight::profile::Rows;
 /// use stampfly_types::Instant;
 ///

@@ -2,10 +2,10 @@
 
 use super::error::CommandError;
 use crate::doctor::Fact;
-use crate::parameters::Parameters;
 use crate::profile::Rows;
 use core::fmt;
 use stampfly_bus::TopicInfo;
+use stampfly_param::Parameters;
 use stampfly_types::Instant;
 
 /// How a sensor's driver does.

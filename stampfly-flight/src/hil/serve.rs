@@ -1,10 +1,10 @@
 //! The vehicle's end of a whole flight: from the greeting to the end.
 
 use super::vehicle::{Flight, Greeting, Line, Over, greet};
-use crate::parameters::Parameters;
 use crate::{Assembled, FlightLoop};
 use core::mem::MaybeUninit;
 use stampfly_bus::Schedule;
+use stampfly_param::Parameters;
 use stampfly_types::{Duration, Instant};
 
 /// A vehicle that has been waiting to be switched on for this long by its own clock stops waiting: a person has had time to

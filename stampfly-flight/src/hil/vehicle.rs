@@ -3,9 +3,9 @@
 use super::frame::Decoder;
 use super::protocol::{Bands, Entries, Entry, Log, Refusal, Reply, Request, Stepped, VERSION};
 use crate::golden::tables;
-use crate::parameters::{self, ParameterError, Parameters};
 use crate::{FlightLoop, InPlace, Observer};
 use stampfly_bus::{Activation, Band, PublishWords, Schedule, Taps, TopicTable};
+use stampfly_param::{ParameterError, Parameters, parameters};
 use stampfly_types::{Duration, Instant};
 
 /// A vehicle that is left alone for this long by its own clock ends the flight: two hundred times what a step may take on a
@@ -143,7 +143,7 @@ pub fn greet<R: Schedule>(line: &mut Line<'_>, byte: u8, now: Instant, config: &
 /// use stampfly_flight::hil::{Bands, Entries, Flight, Greeting, LONGEST, LONGEST_FRAME, Line, Log, Over, Request, greet};
 /// use stampfly_flight::{Assembled, hil};
 /// use stampfly_types::{Duration, Instant, Message, messages::TofData};
-/// # use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+/// # use stampfly_flight::param::{ParameterError, ParameterInfo, Parameters};
 /// # struct Nothing;
 /// # impl Parameters for Nothing {
 /// #     fn describe(&self, _: usize) -> Option<ParameterInfo<'_>> { None }

@@ -6,9 +6,9 @@ use core::fmt;
 use proptest::prelude::*;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::console::{COMMANDS, Command, CommandError, Request, SensorLine, Vehicle, answer};
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
 use stampfly_flight::{NewestSamples, Profile, longest_message};
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_types::messages::{FlightStatus, TofData};
 use stampfly_types::{Instant, Message};
 

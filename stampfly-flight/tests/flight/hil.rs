@@ -9,7 +9,7 @@ use stampfly_flight::hil::{
     Bands, Decoder, Entries, Entry, Flight, Greeting, LONGEST, LONGEST_FRAME, Line, Log, Over, Refusal, Reply, Request,
     SILENCE, VERSION, greet,
 };
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_types::messages::{MotorOutput, TofData};
 use stampfly_types::{Duration, Instant, Message};
 

@@ -5,12 +5,12 @@
 
 use super::translation::is_newer;
 use stampfly_bus::TopicInfo;
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_ground::Client;
 use stampfly_ground::ask::{Ask, Asked, Guided, Reply};
 use stampfly_link::mavlink::dialects::common::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersion, MavlinkWriter, Tunnel};
 use stampfly_link::secure::Payload;
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_services::cable::{Assembly, Envelope, Part, Split, TYPE, fingerprint};
 use stampfly_services::desk;
 use stampfly_sim::vehicle::Setting;

@@ -2,7 +2,7 @@
 
 use stampfly_bus::{Schedule, TopicTable};
 use stampfly_flight::hil::{LONGEST, LONGEST_FRAME, Line, Served, Wire, serve};
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::Parameters;
 use stampfly_sim::vehicle::Port;
 use std::collections::VecDeque;
 use std::io;

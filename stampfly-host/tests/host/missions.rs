@@ -13,6 +13,7 @@ use stampfly_host::campaign::{Flight, run};
 use stampfly_host::flown::fly;
 use stampfly_host::recorder::Recorder;
 use stampfly_mode::transitions::{Event, next};
+use stampfly_param::{Parameters, parameters};
 use stampfly_sim::plant::Pose;
 use stampfly_types::Instant;
 use stampfly_types::messages::FlightPhase;
@@ -73,10 +74,11 @@ fn random_mission(number: u64) -> Setup {
     scene.wind.mean = [(speed * libm::cos(towards)) as f32, (speed * libm::sin(towards)) as f32, 0.0].into();
     scene.vibration = draw.within(0.5, 1.5);
     for name in VARIED {
-        let nominal = scene.plant.iter().find(|row| row.name == name).expect("a plant parameter").value;
-        scene.plant.set(name, nominal * draw.within(0.9, 1.1)).expect("a tenth more or less is in range");
+        let index = parameters::find(&scene.plant, name).expect("a plant parameter");
+        let value = scene.plant.get(index).expect("its value") * draw.within(0.9, 1.1);
+        parameters::set_at(&mut scene.plant, index, value).expect("a tenth more or less is in range");
     }
-    scene.plant.set("battery_charge", draw.within(0.6, 1.0)).expect("in range");
+    scene.plant.battery_charge = draw.within(0.6, 1.0);
     scene.pose = Some(Pose::standing(&scene.plant, draw.within(-core::f64::consts::PI, core::f64::consts::PI)));
     scene.start = match number % 4 {
         // 32 bits of microseconds end in flight.

@@ -3,9 +3,9 @@
 use crate::flown::reference;
 use crate::thorough::thorough;
 use stampfly_board::simulation::{Setup, StampFly};
-use stampfly_flight::parameters;
 use stampfly_host::campaign::{self, Flight};
 use stampfly_host::recorder::Recorder;
+use stampfly_param::parameters;
 
 /// Flies these, with a hash of each flight.
 fn fly(setups: &[(u64, Setup)]) -> Vec<Flight<StampFly, Recorder<StampFly>>> {

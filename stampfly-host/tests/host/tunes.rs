@@ -8,8 +8,9 @@ use stampfly_board::schedule::Runnables;
 use stampfly_board::simulation::mission::Mission;
 use stampfly_board::simulation::{Setup, StampFly};
 use stampfly_control::autotune::{AutotuneStage, AutotuneStatus, AutotuneStop};
-use stampfly_flight::{Observer, parameters};
+use stampfly_flight::Observer;
 use stampfly_host::campaign;
+use stampfly_param::parameters;
 use stampfly_sim::vehicle::Witness;
 
 /// Nothing but what the outcome says.

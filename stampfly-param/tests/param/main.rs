@@ -4,5 +4,6 @@
 mod flash;
 mod foreign;
 mod power_cuts;
+mod requested;
 mod set;
 mod store;

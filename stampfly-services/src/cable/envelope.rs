@@ -16,8 +16,8 @@
 
 use heapless::Vec;
 use stampfly_bus::TopicInfo;
-use stampfly_flight::parameters::Parameters;
 use stampfly_link::secure::{Kind, Payload};
+use stampfly_param::Parameters;
 
 /// The type of our tunnels.
 pub const TYPE: u16 = 0xF1F5;

@@ -10,8 +10,8 @@ use super::unserved::Unserved;
 use crate::cockpit::Cockpit;
 use core::fmt::Write;
 use heapless::String;
-use stampfly_flight::parameters::{self, ParameterError, Parameters};
 use stampfly_link::mavlink::dialects::common::*;
+use stampfly_param::{ParameterError, Parameters, parameters};
 
 /// Characters of a name.
 const NAME: usize = 16;
@@ -145,7 +145,7 @@ pub(super) fn set<C>(
         Err(error) => {
             // A conflict names both parameters.
             _ = match error {
-                ParameterError::Conflict { .. } => write!(text, "{error}"),
+                ParameterError::Conflict(_) => write!(text, "{error}"),
                 _ => write!(text, "{name}: {error}"),
             };
             MavSeverity::MAV_SEVERITY_ERROR

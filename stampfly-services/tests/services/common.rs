@@ -4,8 +4,8 @@ use core::fmt;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::console::{self, CommandError, SensorLine};
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
+use stampfly_param::{Conflict, ParameterError, ParameterInfo, Parameters};
 use stampfly_services::{Cockpit, Connection, Lease, Places, Refusal, Request, Seat, Told, View};
 use stampfly_types::messages::{
     CommandSource, FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity,
@@ -68,8 +68,10 @@ impl Parameters for Two {
         Ok(())
     }
     fn check(&self, _: Option<usize>) -> Result<(), ParameterError> {
-        let conflict =
-            ParameterError::Conflict { parameters: NAMES, reason: "seven and nine never fly together, on no day" };
+        let conflict = ParameterError::Conflict(Conflict {
+            parameters: NAMES,
+            reason: "seven and nine never fly together, on no day",
+        });
         if self.0 == [7.0, 9.0] { Err(conflict) } else { Ok(()) }
     }
 }

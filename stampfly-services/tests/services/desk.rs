@@ -3,9 +3,9 @@
 use core::fmt;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::console::{self, CommandError, Request, SensorLine};
-use stampfly_flight::parameters::{ParameterError, ParameterInfo, Parameters};
 use stampfly_flight::profile::Rows;
 use stampfly_link::secure::Payload;
+use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_services::desk::{Answer, Desk, Room};
 use stampfly_types::Instant;
 

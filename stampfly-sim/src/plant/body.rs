@@ -5,14 +5,13 @@
 //! through [`World::inspect_as`](crate::World::inspect_as) and
 //! [`World::change`](crate::World::change).
 
-use super::{
-    Battery, GRAVITY, Motion, ParameterError, ParameterInfo, Plant, PlantParameters, Pose, ROTORS, RotorFault,
-};
+use super::{Battery, CannotSimulate, GRAVITY, Motion, Plant, PlantParameters, Pose, ROTORS, RotorFault};
 use super::{Scene, WindConfig};
 use crate::conditions::Conditions;
 use core::any::Any;
 use core::fmt;
 use nalgebra::Vector3;
+use stampfly_param::ParameterTable;
 
 /// Disturbance of the sensors by the vehicle that carries them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +127,7 @@ pub trait Body: Any + fmt::Debug {
 }
 
 /// Named parameters from which a body is made.
-pub trait Airframe: Clone + fmt::Debug + PartialEq {
+pub trait Airframe: ParameterTable<f64> + Clone + fmt::Debug + PartialEq {
     /// The body made from them.
     type Body: Body;
 
@@ -155,21 +154,12 @@ pub trait Airframe: Clone + fmt::Debug + PartialEq {
         f64::INFINITY
     }
 
-    /// Sets a parameter by name.
-    ///
-    /// # Errors
-    /// If no parameter has this name or the value is out of range; nothing changes then.
-    fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError>;
-
-    /// All parameters.
-    fn list(&self) -> Vec<ParameterInfo>;
-
     /// Checks that the parameters together describe a vehicle that can be simulated. By default
     /// accepted.
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    fn check(&self) -> Result<(), ParameterError> {
+    /// [`CannotSimulate`] with the reason.
+    fn check(&self) -> Result<(), CannotSimulate> {
         Ok(())
     }
 }
@@ -248,15 +238,7 @@ impl Airframe for PlantParameters {
         self.full_throttle().lift
     }
 
-    fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        Self::set(self, name, value)
-    }
-
-    fn list(&self) -> Vec<ParameterInfo> {
-        self.iter().collect()
-    }
-
-    fn check(&self) -> Result<(), ParameterError> {
+    fn check(&self) -> Result<(), CannotSimulate> {
         Self::check(self)
     }
 }

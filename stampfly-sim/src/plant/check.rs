@@ -1,15 +1,16 @@
 //! Rejects combinations of parameters that are not a quadrotor or cannot be simulated.
 //!
-//! Each parameter has a [range](super::ParameterInfo::range) wide enough for vehicles from 10 g to
-//! 2 kg. Within the ranges, combinations are still possible that make no sense: a battery of 1 Ω in
-//! a vehicle of 37 g, feet too stiff for the step of the physics. A flight with them would give an
-//! arbitrary result, so it is refused with the reason.
+//! Each parameter has a [range](stampfly_param::ParameterInfo) wide enough for vehicles from 10 g
+//! to 2 kg. Within the ranges, combinations are still possible that make no sense: a battery of 1 Ω
+//! in a vehicle of 37 g, feet too stiff for the step of the physics. A flight with them would give
+//! an arbitrary result, so it is refused with the reason.
 //!
 //! For parameters entered by users. Code that constructs [`PlantParameters`] may skip the check,
 //! for example a test with a weightless body.
 
-use super::{DT, ParameterError, PlantParameters, ROTORS};
+use super::{DT, PlantParameters, ROTORS};
 use crate::plant::battery::Battery;
+use core::fmt;
 
 /// Least lift at full duty, in weights. A vehicle that lifts 0.9 of its weight is a valid test of
 /// the flight stack. Below one half the rotors do not spin up.
@@ -22,6 +23,18 @@ const SPRING: f64 = 1.0;
 const DAMPER: f64 = 1.5;
 /// Rate at which rotational drag is evaluated, rad/s: the end of the gyro's range.
 const RATE: f64 = 35.0;
+
+/// Why parameters, each within its range, do not describe a vehicle that can be simulated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CannotSimulate(pub String);
+
+impl fmt::Display for CannotSimulate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for CannotSimulate {}
 
 /// Steady state of the rotors at full duty.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,9 +89,9 @@ impl PlantParameters {
     /// Checks that these parameters are a quadrotor that can be simulated.
     ///
     /// # Errors
-    /// [`ParameterError::Together`] with the reason.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        let refused = |reason: String| Err(ParameterError::Together(reason));
+    /// [`CannotSimulate`] with the reason.
+    pub fn check(&self) -> Result<(), CannotSimulate> {
+        let refused = |reason: String| Err(CannotSimulate(reason));
         let inertia = [self.inertia_x, self.inertia_y, self.inertia_z];
         let half = 0.5 * inertia.iter().sum::<f64>();
         for (axis, moment) in ["x", "y", "z"].into_iter().zip(inertia) {
@@ -113,7 +126,7 @@ impl PlantParameters {
     }
 
     /// Checks that springs and dampers are slow enough for one step of the physics.
-    fn check_step(&self, motor_constant: f64) -> Result<(), ParameterError> {
+    fn check_step(&self, motor_constant: f64) -> Result<(), CannotSimulate> {
         let least = self.inertia_x.min(self.inertia_y);
         let reach = self.foot_offset.max(self.corner_offset);
         // Worst case: all four feet act at once, vertically and about the axis with the least
@@ -136,7 +149,7 @@ impl PlantParameters {
             ("drag_rotation", self.drag_rotation, DT * self.drag_rotation * RATE / least, DAMPER),
         ];
         match quickest.into_iter().find(|(.., acts, limit)| acts > limit) {
-            Some((name, value, ..)) => Err(ParameterError::Together(format!(
+            Some((name, value, ..)) => Err(CannotSimulate(format!(
                 "{name} {value}: with these masses it acts quicker than a step of the physics, {} ms",
                 1e3 * DT
             ))),

@@ -36,13 +36,12 @@ use air::{Air, Push};
 pub use aeroplane::{Aeroplane, AeroplaneParameters, Gear, Propeller, SURFACES, Surface, Trim, TrimError};
 pub use battery::{Battery, BatterySpec, Load};
 pub use body::{Airframe, Body, Disturbance};
-pub use check::FullThrottle;
+pub use check::{CannotSimulate, FullThrottle};
 pub use ground::Ground;
 pub use motion::Motion;
 pub use motor::{ROTORS, RotorFault, Rotors};
 pub use parameters::PlantParameters;
 pub use scene::{Beyond, Hand, Scene};
-pub use table::{ParameterError, ParameterInfo};
 pub use wind::{Wind, WindConfig, WindProfile};
 
 use crate::conditions::Conditions;

@@ -12,14 +12,16 @@ parameters! {
     /// Airframe, motors, propellers, battery, ground and air of a quadrotor in X.
     ///
     /// ```
+    /// use stampfly_sim::param::{Parameters, parameters};
     /// use stampfly_sim::plant::PlantParameters;
     ///
     /// let mut plant = PlantParameters::EXAMPLE;
-    /// plant.set("mass", 0.040)?;
+    /// let index = parameters::set(&mut plant, "mass", 0.040)?;
     /// assert_eq!(plant.mass, 0.040);
-    /// assert!(plant.set("mass", -1.0).is_err() && plant.set("colour", 1.0).is_err());
-    /// assert!(plant.iter().any(|p| p.name == "mass" && p.unit == "kg" && p.value == 0.040));
-    /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
+    /// assert!(parameters::set(&mut plant, "mass", -1.0).is_err());
+    /// assert!(parameters::set(&mut plant, "colour", 1.0).is_err());
+    /// assert!(plant.describe(index).is_some_and(|info| info.name == "mass" && info.unit == "kg"));
+    /// # Ok::<(), stampfly_sim::param::ParameterError<f64>>(())
     /// ```
     PlantParameters,
     /// A quadrotor of 50 g that nobody built, in round numbers: for examples and tests.
@@ -106,16 +108,17 @@ impl PlantParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::ParameterError;
+    use stampfly_param::parameters::{iter, set, validate};
+    use stampfly_param::{ParameterError, Parameters};
 
     #[test]
     fn the_example_lies_in_every_range_and_every_name_can_be_set() {
         let mut parameters = PlantParameters::EXAMPLE;
-        for info in PlantParameters::EXAMPLE.iter() {
-            assert!((info.range.0..=info.range.1).contains(&info.value), "{}", info.name);
-            parameters.set(info.name, info.range.1).expect("the upper end is allowed");
-            assert!(parameters.iter().any(|p| p.name == info.name && p.value == info.range.1));
-            assert!(matches!(parameters.set(info.name, f64::NAN), Err(ParameterError::OutOfRange { .. })));
+        assert_eq!(validate(&parameters), Ok(()));
+        for (index, (info, _)) in iter(&PlantParameters::EXAMPLE).enumerate() {
+            assert_eq!(set(&mut parameters, info.name, info.max), Ok(index), "the upper end is allowed");
+            assert_eq!(parameters.get(index), Some(info.max));
+            assert!(matches!(set(&mut parameters, info.name, f64::NAN), Err(ParameterError::OutOfRange { .. })));
         }
     }
 }

@@ -48,6 +48,7 @@ use stampfly_bus::{Band, Schedule, TopicTable};
 use stampfly_flight::compact::Chunks;
 use stampfly_flight::{FlightLoop, flight_loop};
 use stampfly_log::ulog::{ParameterValue, Topic};
+use stampfly_param::parameters;
 use stampfly_types::Instant;
 
 /// Bus ends of all participants outside a vehicle's runnables.
@@ -320,7 +321,7 @@ impl Options {
         }
         for text in &self.plant {
             let (name, value) = assignment(text)?;
-            simulation.set(name, value).map_err(|error| format!("--plant {text}: {error}"))?;
+            parameters::set(simulation, name, value).map_err(|error| format!("--plant {text}: {error}"))?;
         }
         // Parameters come in any order, so combinations are checked after the last one.
         simulation.check().map_err(|error| format!("--plant {error}"))

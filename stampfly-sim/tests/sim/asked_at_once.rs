@@ -3,9 +3,9 @@
 use core::cell::RefCell;
 use stampfly_bus::TopicInfo;
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::{Parameters, RequestedParameters};
 use stampfly_services::link::mavlink::dialects::common::MavType;
-use stampfly_services::{Hands, Refusal, Request, Requested};
+use stampfly_services::{Hands, Refusal, Request};
 use stampfly_sim::fault::Injector;
 use stampfly_sim::ground::{About, Served, TURN};
 use stampfly_sim::vehicle::{Client, Heard, Link, Live, PortSpec, Ports};
@@ -24,11 +24,12 @@ mod topics {
 
 stampfly_param::parameters! {
     /// A raft.
-    pub struct Numbers, where raft:
-    /// Its lamp.
-    lamp: Lamp {
-        /// Brightness.
-        level = 0.5 in [0.0, 1.0] "1";
+    pub struct Numbers {
+        /// Its lamp.
+        lamp: Lamp {
+            /// Brightness.
+            level = 0.5 in [0.0, 1.0] "1";
+        }
     }
 }
 
@@ -44,7 +45,7 @@ impl Ports for Closed {
 }
 
 /// A vehicle that accepts all commands and carries out none.
-struct Raft(Requested<Numbers, 8>);
+struct Raft(RequestedParameters<Numbers, 8>);
 
 impl Hands for Raft {
     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> {
@@ -79,7 +80,7 @@ fn of_many_commands_of_pages_none_is_called_done_that_was_not() {
     let live = Live { ports: Arc::new(Closed), number: 0, limit: Duration::from_secs(1), speed: None };
     let newest = RefCell::new(NewestSamples::<{ topics::COUNT }, { longest_message(TOPICS) }>::new());
     let none = Injector::new(Instant::ZERO, &[]);
-    let mut served = Served::new(&ABOUT, &live, &none, Raft(Requested::new(Numbers::default())), &newest);
+    let mut served = Served::new(&ABOUT, &live, &none, Raft(RequestedParameters::new(Numbers::default())), &newest);
     let page = Client { port: 0, address: ([127, 0, 0, 1], 1).into() };
     let mut answers: Vec<String> = Vec::new();
     let ask = |served: &mut Served<'_, _, _>, answers: &mut Vec<String>, id, kind| {

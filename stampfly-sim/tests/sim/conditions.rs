@@ -1,8 +1,8 @@
 //! Worlds selected by options, and the resulting parameters of a flight.
 
+use stampfly_param::parameters;
 use stampfly_sim::vehicle::{Options, WorldKind};
 use stampfly_sim::{Conditions, SimulationConfig};
-use std::collections::BTreeSet;
 
 fn changed(options: &Options, seed: u64) -> Result<SimulationConfig, String> {
     let mut simulation = SimulationConfig { seed, ..SimulationConfig::example() };
@@ -28,11 +28,10 @@ fn a_number_that_is_named_is_not_drawn() {
     assert_eq!((simulation.conditions.battery_temperature, simulation.plant.mass), (12.5, 0.051));
     let error = changed(&harsh(&["colour=1"]), 3).expect_err("unknown");
     assert!(error.contains("colour"), "{error}");
-    let names: BTreeSet<_> = simulation.list().iter().map(|row| row.name).collect();
-    assert_eq!(names.len(), simulation.list().len(), "a name is a number of the vehicle or of the conditions");
-    for row in simulation.list() {
+    for (index, (info, _)) in parameters::iter(&simulation).enumerate() {
         let mut simulation = simulation.clone();
-        assert_eq!(simulation.set(row.name, row.range.0), Ok(()), "{}", row.name);
+        // The first of this name, so a name is a number of the vehicle or of the conditions.
+        assert_eq!(parameters::set(&mut simulation, info.name, info.min), Ok(index), "{}", info.name);
     }
 }
 

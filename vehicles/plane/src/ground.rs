@@ -4,8 +4,8 @@ use crate::parameters::Parameters;
 use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_fixed_wing::messages::Home;
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters as ByNumber;
-use stampfly_services::{Hands, Refusal, Request, Requested};
+use stampfly_param::{Parameters as ByNumber, RequestedParameters};
+use stampfly_services::{Hands, Refusal, Request};
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 use stampfly_types::{Instant, Origin};
 
@@ -14,7 +14,7 @@ pub type Newest = NewestSamples<COUNT, { longest_message(&TOPICS) }>;
 
 /// The aircraft's end of the link. It is flown by commands alone: there are no sticks.
 pub struct Board<'b> {
-    parameters: Requested<Parameters, 64>,
+    parameters: RequestedParameters<Parameters, 64>,
     /// As a new vehicle has them.
     defaults: Parameters,
     home: Home,
@@ -25,7 +25,7 @@ impl<'b> Board<'b> {
     /// With the parameters at power-on, and those of a new vehicle.
     #[must_use]
     pub fn new(parameters: &Parameters, defaults: &Parameters, ends: LinkEnds<'b>) -> Self {
-        Self { parameters: Requested::new(*parameters), defaults: *defaults, home: Home::default(), ends }
+        Self { parameters: RequestedParameters::new(*parameters), defaults: *defaults, home: Home::default(), ends }
     }
 }
 
@@ -48,7 +48,7 @@ impl Hands for Board<'_> {
 
     fn request(&mut self, _: Instant, request: Request) -> Result<(), Refusal> {
         match request {
-            Request::ResetParameters => self.parameters.set_all(&self.defaults).map_err(|_| Refusal::Range),
+            Request::ResetParameters => Ok(self.parameters.set_all(&self.defaults)?),
             _ => Err(Refusal::Unsupported),
         }
     }
@@ -60,10 +60,7 @@ impl Hands for Board<'_> {
             *home = newest.data;
         }
         if !armed {
-            for request in parameters.take() {
-                // When it is full, what is shown next is what is in use.
-                let _ = ends.parameter_request.publish(now, request);
-            }
+            parameters.send(|request| ends.parameter_request.publish(now, request).is_ok());
         }
         if let Some(newest) = ends.parameters.has_new().then(|| ends.parameters.latest()).flatten() {
             parameters.adopt(newest.data);

@@ -13,6 +13,7 @@
 use crate::parameters::Parameters;
 use stampfly_link::hisky::HiskyLink;
 use stampfly_param::ParameterTable;
+use stampfly_param::parameters::validate;
 use stampfly_types::GRAVITY;
 
 /// Bytes of an image.
@@ -81,7 +82,7 @@ impl Stored {
                 let _ = row.set(&mut parameters, value);
             }
         }
-        if parameters.validate().is_err() {
+        if validate(&parameters).is_err() {
             parameters = *otherwise;
         }
         Self { link: read_link(image), parameters }

@@ -6,9 +6,9 @@ use crate::messages::SensorOffsets;
 use crate::parameters::Parameters;
 use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_flight::newest::{NewestSamples, longest_message};
-use stampfly_flight::parameters::Parameters as ByNumber;
+use stampfly_param::{Parameters as ByNumber, RequestedParameters};
 use stampfly_services::msp::{Card, Misc, Msp, PidRow, PidTerm, Scale};
-use stampfly_services::{Hands, Helm, Places, Refusal, Request, Requested, Seated, View};
+use stampfly_services::{Hands, Helm, Places, Refusal, Request, Seated, View};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
@@ -74,7 +74,7 @@ pub type Newest = NewestSamples<COUNT, { longest_message(&TOPICS) }>;
 
 /// What programs may ask of it: parameters, and what the board is asked for. It is armed and flown by its transmitter's sticks alone.
 pub struct Board<'b> {
-    parameters: Requested<Parameters, 64>,
+    parameters: RequestedParameters<Parameters, 64>,
     /// As a new vehicle has them.
     defaults: Parameters,
     ends: LinkEnds<'b>,
@@ -86,7 +86,7 @@ impl<'b> Board<'b> {
     /// With the parameters at power-on, and those of a new vehicle.
     #[must_use]
     pub const fn new(parameters: &Parameters, defaults: &Parameters, ends: LinkEnds<'b>) -> Self {
-        Self { parameters: Requested::new(*parameters), defaults: *defaults, ends, asked: None }
+        Self { parameters: RequestedParameters::new(*parameters), defaults: *defaults, ends, asked: None }
     }
 }
 
@@ -105,7 +105,7 @@ impl Hands for Board<'_> {
 
     fn request(&mut self, _: Instant, request: Request) -> Result<(), Refusal> {
         match request {
-            Request::ResetParameters => self.parameters.set_all(&self.defaults).map_err(|_| Refusal::Range),
+            Request::ResetParameters => Ok(self.parameters.set_all(&self.defaults)?),
             Request::SaveParameters | Request::Bind => {
                 self.asked = Some(request);
                 Ok(())
@@ -117,10 +117,7 @@ impl Hands for Board<'_> {
     /// Changes of an armed vehicle wait until it is disarmed.
     fn poll(&mut self, now: Instant, armed: bool) {
         if !armed {
-            for request in self.parameters.take() {
-                // When it is full, what is shown next is what is in use.
-                let _ = self.ends.parameter_request.publish(now, request);
-            }
+            self.parameters.send(|request| self.ends.parameter_request.publish(now, request).is_ok());
         }
         if let Some(parameters) = self.ends.parameters.has_new().then(|| self.ends.parameters.latest()).flatten() {
             self.parameters.adopt(parameters.data);

@@ -44,10 +44,10 @@ use stampfly_flight::console::calibrate::{self, News};
 use stampfly_flight::console::{LineEditor, Piece, Request, answer};
 #[cfg(feature = "hil")]
 use stampfly_flight::hil::COMMAND;
-use stampfly_flight::live::Told;
 use stampfly_link::Address;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::Key;
+use stampfly_param::ChangeDetector;
 use stampfly_services::cable::{Cable, fingerprint};
 use stampfly_services::mavlink::Identity;
 use stampfly_services::{Helm, Places, RadioDesk, Seated, View};
@@ -187,7 +187,7 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
     let Parts {
         memory, health, profile, ends, storage, storage_ends, config, facts, key, link, helm, desk, taken, ..
     } = *parts;
-    let (told, flown) = (Told::new(config.clone()), (config.clone(), false));
+    let (detector, flown) = (ChangeDetector::new(config.clone()), (config.clone(), false));
     let cable = Cable::new(IDENTITY, fingerprint(&TOPICS, &config));
     Console {
         screen: Screen(screen),
@@ -196,7 +196,7 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
         storage,
         storage_ends,
         config,
-        told,
+        detector,
         flown,
         unstored: None,
         key,
@@ -245,8 +245,8 @@ pub struct Console {
     storage_ends: topics::StorageEnds<'static>,
     /// What the vehicle flies with after the next start.
     config: VehicleConfig,
-    /// What it flies with as soon as it is disarmed.
-    told: Told<VehicleConfig>,
+    /// Finds what has changed in it. The vehicle flies with its last one as soon as it is disarmed.
+    detector: ChangeDetector<VehicleConfig>,
     /// What the last flight was flown with, and whether that goes on.
     flown: (VehicleConfig, bool),
     /// A transmitter that was paired and is still to be stored.

@@ -11,6 +11,7 @@ use stampfly_board::messages::ParameterChange;
 use stampfly_board::parameters;
 use stampfly_drivers::Timebase;
 use stampfly_flight::console::Request;
+use stampfly_flight::live::Change;
 use stampfly_services::cable::{BODY, PART, TUNNEL};
 use stampfly_services::desk::{Post, Room};
 
@@ -24,14 +25,14 @@ const ROUNDS: usize = 4;
 impl Console {
     /// Tells what of the parameters has changed, whoever has changed it.
     pub(super) fn tell_changes(&mut self) {
-        let Self { known, told, flown: (flown, was_armed), config, ends, .. } = self;
+        let Self { known, detector, flown: (flown, was_armed), config, ends, .. } = self;
         let is_armed = newest_mode(known.memory).is_some_and(|mode| mode.armed);
         let was_armed = core::mem::replace(was_armed, is_armed);
         if is_armed && !was_armed {
-            flown.clone_from(told.last());
+            flown.clone_from(detector.last());
         }
         let lines = |name: &str| parameters::holders(name).iter().map(|line| *line as usize);
-        let change = told.changes(config, lines, &mut |index, value| {
+        let change = Change::detect(detector, config, lines, &mut |index, value| {
             ends.parameter_change.publish(Clock.now(), &ParameterChange { index: index as u32, value });
         });
         change.into_iter().for_each(changes::hand_over);

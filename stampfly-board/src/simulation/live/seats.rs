@@ -8,8 +8,7 @@ use crate::simulation::settings::tell;
 use crate::topics::ConsoleEnds;
 use stampfly_flight::console;
 use stampfly_flight::console::calibrate::Calibrate;
-use stampfly_flight::live::Told;
-use stampfly_flight::parameters::Parameters;
+use stampfly_param::{ChangeDetector, Parameters};
 use stampfly_services::{Hands, Refusal, Request};
 use stampfly_sim::ground::Ground;
 use stampfly_types::Instant;
@@ -24,8 +23,8 @@ pub(super) struct Board<'b> {
     pub console: ConsoleEnds<'b>,
     /// The configuration of the next start, and of this one as far as runnables hold it, as soon as the vehicle is disarmed.
     pub config: VehicleConfig,
-    /// What of it was told.
-    pub told: Told<VehicleConfig>,
+    /// Finds what has changed in it.
+    pub detector: ChangeDetector<VehicleConfig>,
     pub seen: &'b Seen,
 }
 
@@ -69,8 +68,8 @@ impl Hands for Board<'_> {
 
     /// Tells what of the parameters has changed, whoever has changed it.
     fn poll(&mut self, now: Instant, _: bool) {
-        let Self { told, config, console, seen, .. } = self;
-        tell(now, told, config, console, &seen.changed);
+        let Self { detector, config, console, seen, .. } = self;
+        tell(now, detector, config, console, &seen.changed);
     }
 }
 

@@ -11,7 +11,7 @@ use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
 use crate::simulation::terminal::{Desk, Terminal};
 use crate::topics::ConsoleEnds;
-use stampfly_flight::live::Told;
+use stampfly_param::ChangeDetector;
 use stampfly_services::tello::Destination;
 use stampfly_services::{Tello, View};
 use stampfly_sim::World;
@@ -55,7 +55,8 @@ impl<'b> Services<'b> {
         (faults, world): (&Injector, &World),
         (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
     ) -> Self {
-        let hands = Board { radio, console, config: config.clone(), told: Told::new(config.clone()), seen };
+        let hands =
+            Board { radio, console, config: config.clone(), detector: ChangeDetector::new(config.clone()), seen };
         let mut controls = Ground::new(&ABOUT, live, faults, hands);
         if let Some(signing) = live.ports.signing() {
             Sealed::open(signing.key, &mut controls);

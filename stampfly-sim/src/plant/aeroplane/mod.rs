@@ -21,7 +21,7 @@ pub use propeller::Propeller;
 pub use servos::{SURFACES, Surface};
 pub use trim::{Trim, TrimError};
 
-use super::{Airframe, Battery, Body, DT, Disturbance, Motion, ParameterError, ParameterInfo, Pose, ROTORS};
+use super::{Airframe, Battery, Body, DT, Disturbance, Motion, Pose, ROTORS};
 use super::{RotorFault, Wind, WindConfig};
 use crate::conditions::Conditions;
 use crate::noise::{Noise, Stream};
@@ -327,13 +327,5 @@ impl Airframe for AeroplaneParameters {
 
     fn under(&self, conditions: &Conditions, _seed: u64) -> Self {
         Self::under(self, conditions)
-    }
-
-    fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        Self::set(self, name, value)
-    }
-
-    fn list(&self) -> Vec<ParameterInfo> {
-        self.iter().collect()
     }
 }

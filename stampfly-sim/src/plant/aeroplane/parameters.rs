@@ -15,12 +15,13 @@ parameters! {
     /// the trailing edge left.
     ///
     /// ```
+    /// use stampfly_sim::param::parameters;
     /// use stampfly_sim::plant::AeroplaneParameters;
     ///
     /// let mut plane = AeroplaneParameters::EXAMPLE;
-    /// plane.set("mass", 0.6)?;
-    /// assert!(plane.iter().any(|p| p.name == "mass" && p.unit == "kg" && p.value == 0.6));
-    /// # Ok::<(), stampfly_sim::plant::ParameterError>(())
+    /// parameters::set(&mut plane, "mass", 0.6)?;
+    /// assert_eq!(plane.mass, 0.6);
+    /// # Ok::<(), stampfly_sim::param::ParameterError<f64>>(())
     /// ```
     AeroplaneParameters,
     /// The Ultra Stick 25e of the University of Minnesota's UAV laboratory, with the mass of a slow
@@ -223,14 +224,15 @@ impl AeroplaneParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stampfly_param::parameters::{iter, set, validate};
 
     #[test]
     fn the_example_lies_in_every_range_and_every_name_can_be_set() {
         let mut parameters = AeroplaneParameters::EXAMPLE;
-        for info in AeroplaneParameters::EXAMPLE.iter() {
-            assert!((info.range.0..=info.range.1).contains(&info.value), "{}", info.name);
-            parameters.set(info.name, info.range.1).expect("the upper end is allowed");
-            assert!(parameters.set(info.name, f64::NAN).is_err());
+        assert_eq!(validate(&parameters), Ok(()));
+        for (info, _) in iter(&AeroplaneParameters::EXAMPLE) {
+            set(&mut parameters, info.name, info.max).expect("the upper end is allowed");
+            assert!(set(&mut parameters, info.name, f64::NAN).is_err());
         }
     }
 

@@ -116,7 +116,7 @@ fn text_is_finite(record: &LogRecord) -> bool {
 
 fn index_of(name: &str) -> u32 {
     use stampfly_param::ParameterTable;
-    Parameters::TABLE.iter().position(|row| row.name == name).expect("a parameter").try_into().expect("few")
+    Parameters::TABLE.iter().position(|row| row.info.name == name).expect("a parameter").try_into().expect("few")
 }
 
 fn request(action: ParameterAction, name: &str, value: f32) -> ParameterRequest {

@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use stampfly_param::ParameterTable;
+use stampfly_param::parameters::validate;
 use stampfly_rover::Parameters;
 use stampfly_rover::diag::{Signals, check};
 use stampfly_rover::driver_input::{DriverSelector, DriverSources, demo};
@@ -254,15 +255,15 @@ fn every_fault_is_found_and_named() {
 
 #[test]
 fn every_parameter_has_its_own_field_and_a_default_in_range() {
-    assert_eq!(Parameters::default().validate(), Ok(()));
+    assert_eq!(validate(&Parameters::default()), Ok(()));
     for (index, row) in Parameters::TABLE.iter().enumerate() {
         let mut changed = Parameters::default();
-        let value = if row.get(&changed) == row.min { row.max } else { row.min };
+        let value = if row.get(&changed) == row.info.min { row.info.max } else { row.info.min };
         row.set(&mut changed, value).expect("the ends are in range");
         for (other_index, other) in Parameters::TABLE.iter().enumerate() {
             let expected = if index == other_index { value } else { other.get(&Parameters::default()) };
-            assert_eq!(other.get(&changed), expected, "{} changed {}", row.name, other.name);
-            assert!(index == other_index || row.name != other.name);
+            assert_eq!(other.get(&changed), expected, "{} changed {}", row.info.name, other.info.name);
+            assert!(index == other_index || row.info.name != other.info.name);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Combinations of parameters with which the rover cannot do its work are refused with the reason.
 
+use stampfly_param::parameters::validate;
 use stampfly_param::{ParameterError, ParameterTable};
 use stampfly_rover::Parameters;
 
@@ -23,8 +24,8 @@ fn every_rule_refuses_beyond_its_border_and_passes_at_it() {
     let of_rules: Vec<_> = Parameters::RULES.iter().map(|rule| rule.conflict.parameters).collect();
     assert_eq!(of_rules, BORDERS.map(|(names, ..)| names));
     for (names, passes, refused) in BORDERS {
-        assert_eq!(with(names, passes).validate(), Ok(()), "{names:?}");
-        match with(names, [refused, passes[1]]).validate() {
+        assert_eq!(validate(&with(names, passes)), Ok(()), "{names:?}");
+        match validate(&with(names, [refused, passes[1]])) {
             Err(ParameterError::Conflict(conflict)) => assert_eq!(conflict.parameters, names),
             other => panic!("{names:?}: {other:?}"),
         }

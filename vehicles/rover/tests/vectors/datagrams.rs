@@ -172,8 +172,8 @@ pub fn vectors() -> String {
     });
     let table = Parameters::TABLE.iter();
     let parameters = table.map(|row| {
-        let [default, min, max] = [row.get(&Parameters::default()), row.min, row.max].map(decimal);
-        json!([row.name, default, min, max, row.unit])
+        let [default, min, max] = [row.get(&Parameters::default()), row.info.min, row.info.max].map(decimal);
+        json!([row.info.name, default, min, max, row.info.unit])
     });
     let vectors = json!({
         "origin": "written by `cargo xtask vectors --fix`",

@@ -1,8 +1,8 @@
 //! What programs may ask of the vehicle: parameters, which wait while it is armed, and nothing that flies it.
 
 use stampfly_bus::{Band, Taps as _};
-use stampfly_flight::parameters::set;
 use stampfly_flight::{Assembled, FlightLoop};
+use stampfly_param::parameters::set;
 use stampfly_services::{Hands, Refusal, Request};
 use stampfly_stm32_quad::Parameters;
 use stampfly_stm32_quad::parameters::RollGains;

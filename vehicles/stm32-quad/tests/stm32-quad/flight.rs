@@ -106,9 +106,7 @@ fn gains_that_cannot_fly_do_not() {
 
 #[test]
 fn every_number_is_in_its_range_and_the_throttle_carries_it() {
-    for row in PLANT.iter() {
-        assert!((row.range.0..=row.range.1).contains(&row.value), "{}", row.name);
-    }
+    assert_eq!(stampfly_param::parameters::validate(&PLANT), Ok(()));
     let ideal = PlantParameters { manufacturing_spread: 0.0, ..PLANT };
     let mut plant = Plant::new(&ideal, &WindConfig::CALM, Some(&Pose::hovering(100.0)), 1);
     plant.set_duty([f64::from(HOVER); 4]);

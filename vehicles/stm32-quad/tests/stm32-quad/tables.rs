@@ -124,7 +124,7 @@ fn what_a_calibration_has_found_outlives_a_change_of_gains() {
     for _ in 0..8_400 {
         bench.step(Some(offset), Some(sticks(1.0, 0.0)));
     }
-    let index = Parameters::TABLE.iter().position(|row| row.name == "roll.p").expect("a parameter") as u32;
+    let index = Parameters::TABLE.iter().position(|row| row.info.name == "roll.p").expect("a parameter") as u32;
     for action in [ParameterAction::Set, ParameterAction::Apply] {
         let request = ParameterRequest { action, index, value: 0.25 };
         bench.outside.link.parameter_request.publish(bench.now, request).expect("there is room");
