@@ -1,7 +1,8 @@
-//! The store on a flash that blocks, for a program that knows no `async`.
+//! The store on a blocking flash, for programs without `async`.
 //!
-//! The same store as [`ParameterStore`](crate::ParameterStore): its futures never wait on such a flash, so each is over when it was
-//! polled once. Not beside an executor with something else to do: an erasure takes 50 ms.
+//! It is [`ParameterStore`](crate::ParameterStore), whose futures never wait on such a flash and
+//! complete at their first poll. Not for a task of an executor that has other work: an erasure
+//! blocks it for 50 ms.
 
 use crate::{AnyValue, Disarmed, EraseError, LoadError, OpenError, SaveError, Storable};
 use core::future::Future;
@@ -11,7 +12,8 @@ use core::task::{Context, Poll, Waker};
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use embedded_storage_async::nor_flash::{self as asynchronous, ErrorType};
 
-/// Values with names, in flash. Each function does what that of [`ParameterStore`](crate::ParameterStore) does, and fails as it does.
+/// Values with names, in flash. Each function does what the one of
+/// [`ParameterStore`](crate::ParameterStore) does, with the same errors.
 ///
 /// ```
 /// use stampfly_param::{Disarmed, RamFlash, blocking::ParameterStore, types::messages::FlightStatus};
@@ -20,17 +22,17 @@ use embedded_storage_async::nor_flash::{self as asynchronous, ErrorType};
 /// let disarmed = Disarmed::proven_by(&FlightStatus::default()).expect("nobody has armed it");
 /// store.save_within(disarmed, "hover.thrust", 0.36_f32, 0.1..=0.6).expect("memory keeps everything");
 /// assert_eq!(store.load::<f32>("hover.thrust"), Ok(Some(0.36)));
-/// # Ok::<(), stampfly_param::OpenError<embedded_storage_async::nor_flash::NorFlashErrorKind>>(())
+/// # Ok::<(), stampfly_param::OpenError<stampfly_param::embedded_storage_async::nor_flash::NorFlashErrorKind>>(())
 /// ```
 pub struct ParameterStore<F: NorFlash> {
     store: crate::ParameterStore<Blocking<F>>,
 }
 
 impl<F: NorFlash> ParameterStore<F> {
-    /// The store in these bytes of the flash, which belong to it alone.
+    /// Opens the store in these bytes of the flash, which it uses alone.
     ///
     /// # Errors
-    /// When the range is not at least three whole pages, or the flash does not obey.
+    /// When the range is not at least three whole pages, or the flash fails.
     pub fn open(flash: F, range: Range<u32>) -> Result<Self, OpenError<F::Error>> {
         let store = finish(crate::ParameterStore::open(Blocking(flash), range))?;
         Ok(Self { store })
@@ -39,15 +41,15 @@ impl<F: NorFlash> ParameterStore<F> {
     /// The value of this name, or `None` when none was ever saved.
     ///
     /// # Errors
-    /// When there is a value nobody may use.
+    /// When the stored value cannot be used.
     pub fn load<T: Storable>(&mut self, name: &str) -> Result<Option<T>, LoadError<F::Error>> {
         finish(self.store.load(name))
     }
 
-    /// The same, believed within a range only.
+    /// The same, if the value is within the range.
     ///
     /// # Errors
-    /// When there is a value nobody may use.
+    /// When the stored value cannot be used.
     pub fn load_within<T: Storable + PartialOrd>(
         &mut self,
         name: &str,
@@ -56,18 +58,18 @@ impl<F: NorFlash> ParameterStore<F> {
         finish(self.store.load_within(name, range))
     }
 
-    /// Saves the value of this name, and looks whether it is there.
+    /// Saves the value of this name and reads it back.
     ///
     /// # Errors
-    /// When it is not. What was stored before still is.
+    /// When it was not saved. The previous value is still stored.
     pub fn save<T: Storable>(&mut self, disarmed: Disarmed, name: &str, value: T) -> Result<(), SaveError<F::Error>> {
         finish(self.store.save(disarmed, name, value))
     }
 
-    /// The same, for a value that has a range.
+    /// The same, if the value is within the range.
     ///
     /// # Errors
-    /// When the value is not there afterwards, or out of range.
+    /// When it was not saved, or is out of range.
     pub fn save_within<T: Storable + PartialOrd>(
         &mut self,
         disarmed: Disarmed,
@@ -78,18 +80,18 @@ impl<F: NorFlash> ParameterStore<F> {
         finish(self.store.save_within(disarmed, name, value, range))
     }
 
-    /// Shows every name with its newest value.
+    /// Passes every name with its newest value to `show`.
     ///
     /// # Errors
-    /// When the pages make no sense, or the flash does not obey.
+    /// When the pages are damaged or the flash fails.
     pub fn for_each(&mut self, show: impl FnMut(&str, AnyValue)) -> Result<(), LoadError<F::Error>> {
         finish(self.store.for_each(show))
     }
 
-    /// Forgets every value.
+    /// Erases every value.
     ///
     /// # Errors
-    /// When the flash does not obey.
+    /// When the flash fails.
     pub fn erase(&mut self, disarmed: Disarmed) -> Result<(), EraseError<F::Error>> {
         finish(self.store.erase(disarmed))
     }

@@ -2,10 +2,11 @@
 
 use crate::{ParameterInfo, Parameters};
 
-/// Compares a configuration with what it was at the last comparison, whoever has changed it in between.
+/// Compares a configuration with what it was at the last comparison, whoever has changed it in
+/// between.
 ///
-/// Use it where a configuration has several users: a console, a radio and a page change it as they like, and one place finds
-/// what is new, logs it and passes it on.
+/// Use it where a configuration has several users: a console, a radio and a page change it as they
+/// like, and one place finds what is new, logs it and passes it on.
 ///
 /// ```
 /// use stampfly_param::{ChangeDetector, parameters};
@@ -48,8 +49,8 @@ impl<C: Parameters + Clone + PartialEq> ChangeDetector<C> {
         &self.last
     }
 
-    /// Passes the number, the description and the new value of each parameter that has changed to `changed`. Returns whether
-    /// anything in the configuration has changed, parameter or not.
+    /// Passes the number, the description and the new value of each parameter that has changed to
+    /// `changed`. Returns whether anything in the configuration has changed, parameter or not.
     pub fn detect(&mut self, config: &C, changed: &mut dyn FnMut(usize, ParameterInfo<'_>, f32)) -> bool {
         if self.last == *config {
             return false;

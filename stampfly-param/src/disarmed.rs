@@ -1,20 +1,21 @@
-//! The proof that motors are off.
+//! The proof that the vehicle is disarmed.
 
 use stampfly_types::messages::FlightStatus;
 
-/// The vehicle was disarmed when this was made. It is worth one write and cannot be copied or kept in a log.
+/// Proof that the vehicle was disarmed when this was made. It allows one write and cannot be
+/// copied.
 ///
-/// It proves a moment. Whoever writes closes the gap between proof and write: by looking at the newest mode, and by
-/// keeping the motors still until the write is done.
+/// The caller has to close the gap between proof and write: use the newest mode, and keep the
+/// motors off until the write is done.
 ///
 /// ```
 /// use stampfly_param::Disarmed;
-/// use stampfly_types::messages::FlightStatus;
+/// use stampfly_param::types::messages::FlightStatus;
 /// assert!(Disarmed::proven_by(&FlightStatus { armed: true, ..Default::default() }).is_none());
 /// assert!(Disarmed::proven_by(&FlightStatus::default()).is_some());
 /// ```
 #[derive(Debug)]
-#[must_use = "a proof is for the write it allows"]
+#[must_use = "the proof is for the write that it allows"]
 pub struct Disarmed(());
 
 impl Disarmed {

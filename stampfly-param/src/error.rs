@@ -1,4 +1,4 @@
-//! What can go wrong, by operation.
+//! Errors of the store, one type per operation.
 
 use crate::{AnyValue, Kind};
 use core::fmt;
@@ -10,9 +10,9 @@ use sequential_storage::Error;
 pub enum OpenError<E> {
     /// The range is not at least three whole pages.
     NoRoom,
-    /// The flash gives back something else than what was written.
+    /// What was read back differs from what was written.
     NotKept,
-    /// The flash.
+    /// The flash reports an error.
     Flash(E),
 }
 
@@ -20,25 +20,27 @@ pub enum OpenError<E> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LoadError<E> {
-    /// What is stored is outside its range, or not a number: the range has changed, or the flash lies.
+    /// The stored value is outside the range, or NaN: the range has changed, or the flash is
+    /// defective.
     OutOfRange {
-        /// What is stored.
+        /// The stored value.
         stored: AnyValue,
     },
-    /// What is stored is of another type than asked for.
+    /// The stored value has another type.
     OtherKind {
-        /// Of which.
+        /// Its type.
         stored: Kind,
     },
     /// Another name has the same number in flash, and is stored.
     NameTaken,
-    /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
+    /// The pages are damaged. [`ParameterStore::erase`](crate::ParameterStore::erase) repairs them.
     Corrupted,
-    /// The flash.
+    /// The flash reports an error.
     Flash(E),
 }
 
-/// Why a value was not saved. What was stored before still is, unless the flash does [not keep](Self::NotKept) things.
+/// Why a value was not saved. The previous one is still stored, except after
+/// [`NotKept`](Self::NotKept).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SaveError<E> {
@@ -46,15 +48,16 @@ pub enum SaveError<E> {
     OutOfRange,
     /// The name is longer than [`LONGEST_NAME`](crate::LONGEST_NAME).
     NameTooLong,
-    /// Another name has the same number in flash: one in four thousand million pairs has. Give it another name.
+    /// Another name has the same number in flash, as one in 2³² pairs of names has. Choose another
+    /// name.
     NameTaken,
     /// More names than the pages have room for.
     Full,
-    /// The flash took the value and gives back something else.
+    /// What was read back differs from what was written.
     NotKept,
-    /// The pages make no sense. [`ParameterStore::erase`](crate::ParameterStore::erase) helps.
+    /// The pages are damaged. [`ParameterStore::erase`](crate::ParameterStore::erase) repairs them.
     Corrupted,
-    /// The flash.
+    /// The flash reports an error.
     Flash(E),
 }
 
@@ -62,9 +65,9 @@ pub enum SaveError<E> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum EraseError<E> {
-    /// The flash gives back something else than what was written.
+    /// What was read back differs from what was written.
     NotKept,
-    /// The flash.
+    /// The flash reports an error.
     Flash(E),
 }
 

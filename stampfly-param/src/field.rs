@@ -3,7 +3,8 @@
 use crate::Number;
 use stampfly_types::Duration;
 
-/// A field whose value is represented by a number: a number itself, yes or no, a time in seconds, or an enumeration.
+/// A field whose value is represented by a number: a number itself, yes or no, a time in seconds,
+/// or an enumeration.
 ///
 /// ```
 /// use stampfly_param::ParameterField;
@@ -49,8 +50,9 @@ impl ParameterField for u16 {
     }
 }
 
-/// Seconds, rounded to microseconds. A duration that was set by a number is read back as the same number: up to 16 seconds
-/// every microsecond has a number of its own, and above that a number always gives the same duration.
+/// Seconds, rounded to microseconds. A duration that was set by a number is read back as the same
+/// number: up to 16 seconds every microsecond has a number of its own, and above that a number
+/// always gives the same duration.
 impl ParameterField for Duration {
     fn number(self) -> f32 {
         // Not `seconds`, which is off by one in the last place for some.
@@ -61,7 +63,8 @@ impl ParameterField for Duration {
     }
 }
 
-/// Makes enumerations that [`message_enum!`](crate::types::message_enum!) declares usable as parameters, by their numbers.
+/// Makes enumerations that [`message_enum!`](crate::types::message_enum!) declares usable as
+/// parameters, by their numbers.
 ///
 /// ```
 /// use stampfly_param::{ParameterField, parameter_enums};

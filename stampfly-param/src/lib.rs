@@ -1,32 +1,33 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # The parts
-//! Parameters: a table of them, a change while the vehicle runs, and values that survive a power cut.
-//!
-//! | type | what it is |
+//! | item | what it is |
 //! |---|---|
-//! | [`parameters!`] | declares a vehicle's parameters: name, default, range, unit |
-//! | [`rules!`], [`rules::check`] | which two values cannot be together, and why |
-//! | [`ParameterSet`] | applies a change as a whole at the next period, and rolls it back |
-//! | [`ParameterStore`] | loads and saves values by name, on any NOR flash; [`blocking::ParameterStore`] without `async` |
-//! | [`Storable`], [`AnyValue`] | what can be saved: numbers, yes or no, up to 32 bytes |
-//! | [`RamFlash`] | a flash that forgets, for desktop programs and tests |
-//! | [`Disarmed`] | the proof without which nothing is written |
-//! | [`key`] | the number a name has in flash |
+//! | [`parameters!`], [`ParameterTable`] | the table of a vehicle's parameters |
+//! | [`Parameters`], [`ParameterInfo`], [`ParameterError`] | reading and changing by number, whatever holds the values |
+//! | [`mod@parameters`] | the same by name, with the checks |
+//! | [`ParameterField`], [`parameter_enums!`] | types of fields that can be parameters |
+//! | [`rules!`], [`mod@rules`], [`Conflict`] | which two values cannot be combined, and why |
+//! | [`ParameterSet`], [`ParameterRequest`], [`ParameterStatus`] | a change as a whole at the next period, and roll-back |
+//! | [`RequestedParameters`] | the other end of the requests |
+//! | [`ChangeDetector`] | which parameters of a configuration have changed |
+//! | [`ParameterStore`], [`blocking::ParameterStore`] | values by name in NOR flash |
+//! | [`Storable`], [`AnyValue`] | what can be stored |
+//! | [`RamFlash`] | a flash in memory, for desktop programs and tests |
+//! | [`Disarmed`] | the proof that every write requires |
+//! | [`key`] | the number that stands for a name in flash |
 //!
-//! Use it at power-on, to overlay a vehicle's defaults with what its owner has saved, and from a console. Not in flight:
-//! while flash is written, an ESP32 runs nothing that is not in RAM, for up to 200 ms.
+//! # Storage and power cuts
+//! A value is appended and becomes valid with its last word, so after a cut each name has either
+//! its previous value or the one that was being written. The tests cut every write and every
+//! erasure at every word.
 //!
-//! A value is stored with its type and its name, and found by the name's 32-bit FNV-1a hash. Two names with one hash are told
-//! apart: the second is refused.
+//! [`ParameterStore::open`] erases pages that are not marked as a store, about 50 ms a page, once.
+//! Load at power-on, save while disarmed. Not in flight: while flash is written, an ESP32 executes
+//! only code in RAM, for up to 200 ms.
 //!
-//! # What a power cut can do
-//! A value is appended and becomes valid with its last word, so after a cut each name has the value before it or the one
-//! that was being written. The tests cut every write and every erasure at every word.
-//!
-//! # What was in flash before
-//! It may be anything: the first page of a store says that the store has erased the others. Where it does not say so
-//! [`ParameterStore::open`] erases all of them, which takes some 50 ms a page and happens once.
+//! A value is found by its name's 32-bit FNV-1a hash. Of two names with the same hash the second is
+//! refused.
 #![no_std]
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! The pages of a store, and the mark on the first of them that says whose they are.
+//! The pages of a store, and the mark on the first of them.
 //!
-//! Flash that comes from somewhere else is not blank: other firmware leaves pages whose ends happen to look open, and a
-//! value written over them is lost. So the first page tells that all others were erased for this purpose. The mark goes
-//! before anything else is erased and comes back after everything is, so a power cut in between leaves none.
+//! Flash with other content is not blank: other firmware leaves pages whose ends may look free, and
+//! a value written there is lost. The mark on the first page says that all others were erased for
+//! this store. It is erased first and written last, so a power cut in between leaves no mark.
 
 use crate::EraseError;
 use core::ops::Range;
@@ -45,7 +45,8 @@ impl Pages {
         Mark(mark)
     }
 
-    /// Is this a store of this version and size? If not it is blank, of other firmware, or half erased.
+    /// Is this a store of this version and size? If not it is blank, of other firmware, or half
+    /// erased.
     pub async fn are_ours<F: NorFlash>(&self, flash: &mut F) -> Result<bool, F::Error> {
         let mut found = Mark([0; LENGTH]);
         flash.read(self.mark.start, &mut found.0).await?;
@@ -54,7 +55,8 @@ impl Pages {
 
     /// Erases everything and leaves the mark.
     pub async fn format<F: NorFlash>(&self, flash: &mut F) -> Result<(), EraseError<F::Error>> {
-        // One page at a time, the mark's first: that is how long everything else on the chip has to wait.
+        // One page at a time, the mark's first: that is how long everything else on the chip has to
+        // wait.
         for from in (self.mark.start..self.values.end).step_by(F::ERASE_SIZE.max(1)) {
             flash.erase(from, from.saturating_add(F::ERASE_SIZE as u32)).await.map_err(EraseError::Flash)?;
         }

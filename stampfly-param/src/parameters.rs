@@ -1,17 +1,16 @@
 //! Reading and changing parameters by name or number, whatever holds their values.
 //!
-//! [`Parameters`] is the interface of a console, a radio link, a configuration page or a command line to a vehicle's
-//! parameters. It is object safe: a service takes a `&mut dyn Parameters` and works with any vehicle. The macro
-//! [`parameters!`](crate::parameters!) implements it for a configuration struct; implement it by hand where values are kept in
-//! another way.
+//! [`Parameters`] is the interface of a console, a radio link, a configuration page or a command
+//! line to a vehicle's parameters. It is object safe: a service takes a `&mut dyn Parameters` and
+//! works with any vehicle. [`parameters!`](crate::parameters!) implements it for a configuration
+//! struct; implement it by hand where values are kept in another way.
 //!
-//! The functions of this module add the checks: [`set`] changes one parameter if its range and the rules allow it,
-//! [`set_alone`] checks the range only, [`validate`] checks everything, [`settle`] repairs values that were stored by another
-//! version.
+//! The functions add the checks: [`set`] changes one parameter if its range and the rules allow
+//! it, [`set_alone`] checks the range only, [`validate`] checks everything, [`settle`] repairs
+//! values that another version has stored.
 //!
-//! Values are `f32` unless the type says otherwise, as in `Parameters<f64>`.
-//!
-//! Do not use it in a control loop: a component reads the fields of its configuration.
+//! Values are `f32` unless the type says otherwise, as in `Parameters<f64>`. Control loops do not
+//! use this module; a component reads the fields of its configuration.
 
 use crate::rules::Conflict;
 use core::fmt;
@@ -41,7 +40,8 @@ pub struct ParameterInfo<'p, N = f32> {
     pub max: N,
     /// What the parameter does.
     pub meaning: &'p str,
-    /// Does a change take effect while the vehicle is armed? If not, it waits until the vehicle is disarmed.
+    /// Does a change take effect while the vehicle is armed? If not, it waits until the vehicle is
+    /// disarmed.
     pub in_flight: bool,
 }
 
@@ -95,7 +95,8 @@ impl<N> From<Conflict> for ParameterError<N> {
     }
 }
 
-/// The message for a person who changes a parameter of an armed vehicle that does not change [in flight](ParameterInfo::in_flight).
+/// The message for a person who changes a parameter of an armed vehicle that does not change [in
+/// flight](ParameterInfo::in_flight).
 pub const WAITS: &str = "not in flight: waits until the vehicle is disarmed";
 
 /// The parameters of a vehicle, numbered from zero without gaps.
@@ -134,14 +135,16 @@ pub trait Parameters<N: Number = f32> {
     /// Its value; `None` behind the last.
     fn get(&self, index: usize) -> Option<N>;
 
-    /// Changes its value without looking at the others. To change one parameter use [`set`](fn@set) or [`set_at`], which
-    /// check the rules; to change several in any order use [`set_alone`] and [`check`](Self::check) once at the end.
+    /// Changes its value without looking at the others. To change one parameter use [`set`](fn@set)
+    /// or [`set_at`], which check the rules; to change several in any order use [`set_alone`] and
+    /// [`check`](Self::check) once at the end.
     ///
     /// # Errors
     /// When there is no such parameter or it does not take the value; it is unchanged then.
     fn set(&mut self, index: usize, value: N) -> Result<(), ParameterError<N>>;
 
-    /// Checks the rules between parameters: all of them, or those about one parameter. Without rules it always succeeds.
+    /// Checks the rules between parameters: all of them, or those about one parameter. Without
+    /// rules it always succeeds.
     ///
     /// # Errors
     /// [`ParameterError::Conflict`].
@@ -181,10 +184,12 @@ pub fn find<N: Number>(parameters: &dyn Parameters<N>, name: &str) -> Result<usi
     names.position(|found| found).ok_or(ParameterError::Unknown)
 }
 
-/// Changes the parameter of this name if its range and the rules allow the value. Returns its number.
+/// Changes the parameter of this name if its range and the rules allow the value. Returns its
+/// number.
 ///
 /// # Errors
-/// When there is no such parameter, the value is out of range, or it contradicts another parameter. Nothing has changed then.
+/// When there is no such parameter, the value is out of range, or it contradicts another parameter.
+/// Nothing has changed then.
 pub fn set<N: Number>(parameters: &mut dyn Parameters<N>, name: &str, value: N) -> Result<usize, ParameterError<N>> {
     let index = find(parameters, name)?;
     set_at(parameters, index, value).map(|()| index)
@@ -204,8 +209,8 @@ pub fn set_at<N: Number>(parameters: &mut dyn Parameters<N>, index: usize, value
     Ok(())
 }
 
-/// Changes the parameter with this number if its range allows the value, without looking at the others. Call
-/// [`check`](Parameters::check) after the last of several changes.
+/// Changes the parameter with this number if its range allows the value, without looking at the
+/// others. Call [`check`](Parameters::check) after the last of several changes.
 ///
 /// # Errors
 /// When there is no such parameter or the value is out of range. Nothing has changed then.
@@ -232,10 +237,12 @@ pub fn validate<N: Number>(parameters: &dyn Parameters<N>) -> Result<(), Paramet
     }
 }
 
-/// Sets both parameters of every violated rule to their defaults. For values from a storage: another version may have
-/// allowed them, and the vehicle should start nevertheless. `replaced` receives each conflict. Returns their number.
+/// Sets both parameters of every violated rule to their defaults. For values from a storage:
+/// another version may have allowed them, and the vehicle should start nevertheless. `replaced`
+/// receives each conflict. Returns their number.
 ///
-/// It terminates: every turn sets at least one more parameter to its default, and the defaults violate no rule.
+/// It terminates: every turn sets at least one more parameter to its default, and the defaults
+/// violate no rule.
 ///
 /// ```
 /// use stampfly_param::parameters;

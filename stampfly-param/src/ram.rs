@@ -1,7 +1,7 @@
-//! A flash that forgets: memory that behaves as NOR flash does.
+//! NOR flash in memory, for desktop programs, simulators and tests.
 //!
-//! For desktop programs, simulators and tests. Bits can be cleared and not set, whole pages are erased, and what is not aligned is
-//! refused, so what works here is not refused by a real one. It never fails; a flash that loses its power is a test's business.
+//! As in a real flash, bits can only be cleared, whole pages are erased, and misaligned access is
+//! refused. It never fails; the crate's tests have a flash that loses its power.
 
 use embedded_storage_async::nor_flash as asynchronous;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlashErrorKind};

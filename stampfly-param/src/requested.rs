@@ -1,17 +1,19 @@
-//! The parameters of a vehicle that changes them by request: the other end of a [`ParameterSet`](crate::ParameterSet).
+//! The parameters of a vehicle that changes them by request: the other end of a
+//! [`ParameterSet`](crate::ParameterSet).
 
 use crate::{ParameterAction, ParameterError, ParameterInfo, ParameterRequest, ParameterTable, Parameters, parameters};
 use heapless::Deque;
 
 /// [`Parameters`] whose changes become [`ParameterRequest`]s, with room for `N` that wait.
 ///
-/// A service reads and changes it by name or number. [`send`](Self::send) publishes the requests, which the vehicle's
-/// [`ParameterSet`](crate::ParameterSet) takes at its next period; [`adopt`](Self::adopt) takes over what it says is in use. A
-/// change is shown at once, as if the vehicle had taken it. Without room for it, it fails with [`ParameterError::Busy`]; with
-/// as much room as there are parameters, that does not happen.
+/// A service reads and changes it by name or number. [`send`](Self::send) publishes the requests,
+/// which the vehicle's [`ParameterSet`](crate::ParameterSet) takes at its next period;
+/// [`adopt`](Self::adopt) takes over what it says is in use. A change is shown at once, as if the
+/// vehicle had taken it. Without room for it, it fails with [`ParameterError::Busy`]; with as much
+/// room as there are parameters, that does not happen.
 ///
-/// Use it beside a service, when the vehicle runs elsewhere or its parameters have to be recorded as topics. A service that owns
-/// the configuration changes it directly.
+/// Use it beside a service, when the vehicle runs elsewhere or its parameters have to be recorded
+/// as topics. A service that owns the configuration changes it directly.
 ///
 /// ```
 /// use stampfly_param::types::Instant;
@@ -81,8 +83,8 @@ impl<P: ParameterTable, const N: usize> RequestedParameters<P, N> {
         Ok(())
     }
 
-    /// Passes the requests to `publish`, and behind the last one that they be applied. When `publish` returns `false` because
-    /// it has no room, the rest waits for the next call.
+    /// Passes the requests to `publish`, and behind the last one that they be applied. When
+    /// `publish` returns `false` because it has no room, the rest waits for the next call.
     pub fn send(&mut self, mut publish: impl FnMut(ParameterRequest) -> bool) {
         while let Some(request) = self.waiting.front() {
             if !publish(*request) {

@@ -1,12 +1,14 @@
-//! Combinations of values with which a vehicle cannot do its work, each value being in its range.
+//! Combinations of two values that contradict each other, although each is in its range.
 //!
-//! A rule is about two parameters and has a reason in words. A vehicle has a table of them ([`rules!`](crate::rules!)), and
-//! [`check`] names the first that is broken. Use it after the check of ranges, on a copy or with the old value at hand: when one
-//! value is set, for the rules about it, and once at the end after many were set in some order. What is wrong about one
-//! parameter alone belongs into its range.
+//! A rule names two parameters and has a reason in words. A vehicle has a table of rules
+//! ([`rules!`](crate::rules!)), and [`check`] returns the first that is violated. Check it after
+//! the ranges, on a copy or with the previous value at hand: the rules about a parameter when that
+//! one changes, all rules after several were changed in any order. What concerns one parameter
+//! alone belongs into its range.
 //!
-//! A rule looks at its two parameters and at no other. So a set of values in which no rule is broken stays one when a change is
-//! checked by the rules about the value that changed, and defaults for both parameters of a broken rule mend it.
+//! A rule depends on its two parameters and on no other. Therefore a valid configuration stays
+//! valid when only the rules about the changed parameter are checked, and the defaults of both
+//! parameters repair a violated rule.
 
 use core::fmt;
 
@@ -60,7 +62,8 @@ pub fn check<C>(rules: &[Rule<C>], config: &C, about: Option<&str>) -> Result<()
     concerned.find(|rule| !(rule.holds)(config)).map_or(Ok(()), |rule| Err(rule.conflict))
 }
 
-/// Writes a table of [`Rule`]s: the two parameters, what must hold, and what is wrong when it does not.
+/// Writes a table of [`Rule`]s: the two parameters, what must hold, and what is wrong when it does
+/// not.
 ///
 /// ```
 /// use stampfly_param::rules::{self, Rule};

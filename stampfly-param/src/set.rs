@@ -1,10 +1,12 @@
-//! Changing the parameters of a running vehicle: collect, validate, apply at the next period, roll back.
+//! Changing the parameters of a running vehicle: collect, validate, apply at the next period, roll
+//! back.
 //!
-//! Requests change a candidate; nothing is in use before `Apply`, and then the whole candidate at once, at the start of
-//! the next period. The set before is kept: `RollBack` returns to it, and so does a fault found within the probation
-//! after a change. Only the last change can be rolled back; a second `RollBack` undoes the first.
+//! Requests change a candidate. `Apply` validates it as a whole, and the next period uses it. The
+//! previous set is kept: `RollBack` returns to it, and so does a fault within the probation after a
+//! change. Only the last change can be rolled back; a second `RollBack` undoes the first.
 //!
-//! Use it for what may change while the vehicle moves. For what needs a vehicle at rest, save it and restart.
+//! Use it for parameters that may change while the vehicle moves. What needs a vehicle at rest is
+//! saved and applies after a restart.
 
 use crate::{ParameterError, ParameterTable, Parameters, parameters};
 use stampfly_types::{Duration, Instant, message, message_enum};
@@ -80,7 +82,7 @@ pub struct ParameterSet<P> {
     on_probation: bool,
     probation: Duration,
     status: ParameterStatus,
-    /// What was told of the parameters last.
+    /// The status that [`period`](Self::period) returned last.
     told: Option<ParameterStatus>,
 }
 
@@ -92,7 +94,8 @@ impl<P: ParameterTable + Copy + Default> Default for ParameterSet<P> {
 }
 
 impl<P: ParameterTable + Copy> ParameterSet<P> {
-    /// A set that starts with these values. A fault within `probation` after a change rolls it back.
+    /// A set that starts with these values. A fault within `probation` after a change rolls it
+    /// back.
     ///
     /// # Errors
     /// When the values are not [valid](parameters::validate).
@@ -162,7 +165,8 @@ impl<P: ParameterTable + Copy> ParameterSet<P> {
         outcome
     }
 
-    /// Start of a period: the parameters to use in it. `healthy`: no fault was found in the period before.
+    /// Start of a period: the parameters to use in it. `healthy`: no fault was found in the period
+    /// before.
     pub fn step(&mut self, now: Instant, healthy: bool) -> P {
         self.on_probation &= now.since(self.status.applied_at) <= self.probation;
         let failed = self.on_probation && !healthy;
@@ -179,7 +183,8 @@ impl<P: ParameterTable + Copy> ParameterSet<P> {
         self.active
     }
 
-    /// A whole period: does what these requests ask for, [steps](Self::step), and says what is in use if that or its status is not what it said last.
+    /// A whole period: handles these requests, [steps](Self::step), and returns the parameters in
+    /// use with their status, if the status has changed since the last call.
     ///
     /// ```
     /// # stampfly_param::parameters! {

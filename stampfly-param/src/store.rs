@@ -1,4 +1,4 @@
-//! The store: a name, a value, a place in flash.
+//! Values with names in NOR flash.
 
 use crate::pages::Pages;
 use crate::value::{Item, LONGEST, LONGEST_NAME};
@@ -26,7 +26,7 @@ pub const fn key(name: &str) -> u32 {
     hash
 }
 
-/// Room for one key, the kind, one value and one name, a whole number of words, aligned as flash likes it.
+/// Buffer for a key, a kind, a value and a name: a whole number of words, aligned to words.
 #[repr(align(4))]
 struct Scratch([u8; 4 + 4 + LONGEST + LONGEST_NAME]);
 
@@ -38,18 +38,24 @@ impl Scratch {
 
 type NoCache = Cache<Uncached, Uncached, Uncached, u32>;
 
-/// Values with names, in flash. On a flash that blocks: [`blocking::ParameterStore`](crate::blocking::ParameterStore).
+/// Values with names, in flash. On a flash that blocks:
+/// [`blocking::ParameterStore`](crate::blocking::ParameterStore).
 ///
 /// ```
-/// # #[path = "../tests/param/flash.rs"] mod flash;
-/// # use flash::Flash;
-/// use embassy_futures::block_on;
-/// use stampfly_param::{Disarmed, LoadError, ParameterStore, Kind};
-/// use stampfly_types::messages::FlightStatus;
+/// use stampfly_param::{Disarmed, Kind, LoadError, ParameterStore, RamFlash};
+/// use stampfly_param::types::messages::FlightStatus;
 ///
+/// # fn block_on<T>(future: impl Future<Output = T>) -> T {
+/// #     let mut context = core::task::Context::from_waker(core::task::Waker::noop());
+/// #     let mut future = core::pin::pin!(future);
+/// #     loop {
+/// #         if let core::task::Poll::Ready(done) = future.as_mut().poll(&mut context) { return done; }
+/// #     }
+/// # }
+/// // `block_on` is that of any executor.
 /// let disarmed = || Disarmed::proven_by(&FlightStatus::default()).unwrap();
 /// block_on(async {
-///     let mut store = ParameterStore::open(Flash::new(), 0..1280).await.unwrap();
+///     let mut store = ParameterStore::open(RamFlash::<0x4000>::new(), 0..0x4000).await.unwrap();
 ///     assert_eq!(store.load::<u32>("serial").await, Ok(None));
 ///     assert!(store.save(disarmed(), "serial", 16_777_217_u32).await.is_ok());
 ///     assert_eq!(store.load("serial").await, Ok(Some(16_777_217_u32)));
@@ -72,15 +78,15 @@ pub struct ParameterStore<F: NorFlash> {
 }
 
 impl<F: NorFlash> ParameterStore<F> {
-    /// The store in these bytes of the flash, which belong to it alone. When they hold anything but a store of this
-    /// version and size they are erased first, some 50 ms a page; a power cut in between, and the next start does it
-    /// again.
+    /// Opens the store in these bytes of the flash, which it uses alone. If they are not a store of
+    /// this version and size they are erased first, about 50 ms a page; after a power cut in
+    /// between, the next start repeats it.
     ///
-    /// For power-on, before there is a mode machine to ask: this is the one thing that writes without a [`Disarmed`]. It
-    /// can be done only by who holds the driver of the flash, and gives it away with that.
+    /// Call it at power-on, before there is a mode machine: it is the only function that writes
+    /// without a [`Disarmed`], and it takes the driver of the flash.
     ///
     /// # Errors
-    /// When the range is not at least three whole pages, or the flash does not obey. Defaults apply.
+    /// When the range is not at least three whole pages, or the flash fails. Use the defaults.
     pub async fn open(mut flash: F, range: Range<u32>) -> Result<Self, OpenError<F::Error>> {
         let pages = Pages::of::<F>(range).ok_or(OpenError::NoRoom)?;
         let config = MapConfig::try_new(pages.values.clone()).map_err(|_| OpenError::NoRoom)?;
@@ -90,13 +96,13 @@ impl<F: NorFlash> ParameterStore<F> {
         Ok(Self { map: MapStorage::new(flash, config, Cache::new_uncached()), pages })
     }
 
-    /// The value of this name, or `None` when none was ever saved. Reads flash only.
+    /// The value of this name, or `None` if none was saved.
     ///
     /// # Errors
-    /// When there is a value nobody may use, one of another type among them; the default applies then.
+    /// When the stored value is damaged or has another type. Use the default.
     pub async fn load<T: Storable>(&mut self, name: &str) -> Result<Option<T>, LoadError<F::Error>> {
         let Some(stored) = self.stored(name).await? else { return Ok(None) };
-        // A boolean that is neither is damage.
+        // A boolean that is neither 0 nor 1.
         let other = if stored.kind() == T::KIND {
             LoadError::Corrupted
         } else {
@@ -105,7 +111,8 @@ impl<F: NorFlash> ParameterStore<F> {
         stored.get().map(Some).ok_or(other)
     }
 
-    /// The same, believed within a range only: a later version of the program may allow less than the one that saved it.
+    /// As [`load`](Self::load), if the value is within the range: another version of the program
+    /// may have saved it with a wider one.
     ///
     /// # Errors
     /// As [`load`](Self::load), and when the value is out of range or not a number.
@@ -120,11 +127,13 @@ impl<F: NorFlash> ParameterStore<F> {
         }
     }
 
-    /// Saves the value of this name, and looks whether it is there. Up to 200 ms on an ESP32, when a page has to be
-    /// erased. What is there already is not written again; a value of another type is replaced.
+    /// Saves the value of this name and reads it back. Takes up to 200 ms on an ESP32, when a page
+    /// has to be erased. A value that is stored already is not written again; a value of another
+    /// type is replaced.
     ///
     /// # Errors
-    /// When the flash does not take it, or the name is too long or has the number of another. What was stored before still is.
+    /// When the flash fails, or the name is too long or has the number of another. The previous
+    /// value is still stored.
     pub async fn save<T: Storable>(&mut self, _: Disarmed, name: &str, value: T) -> Result<(), SaveError<F::Error>> {
         if name.len() > LONGEST_NAME {
             return Err(SaveError::NameTooLong);
@@ -133,7 +142,7 @@ impl<F: NorFlash> ParameterStore<F> {
         match self.stored(name).await {
             Ok(stored) if stored == Some(value) => return Ok(()),
             Err(LoadError::NameTaken) => return Err(SaveError::NameTaken),
-            // Whatever is there will be replaced, damage too.
+            // Anything else is replaced, damage included.
             _ => {}
         }
         let mut scratch = Scratch::new();
@@ -146,7 +155,7 @@ impl<F: NorFlash> ParameterStore<F> {
         }
     }
 
-    /// The same, for a value that has a range.
+    /// As [`save`](Self::save), if the value is within the range.
     ///
     /// # Errors
     /// As [`save`](Self::save), and when the value is out of range or not a number.
@@ -163,11 +172,11 @@ impl<F: NorFlash> ParameterStore<F> {
         self.save(disarmed, name, value).await
     }
 
-    /// Shows every name with its newest value, in the order of their numbers in flash. Reads all pages once for each name: for a
-    /// console, not for a control loop.
+    /// Passes every name with its newest value to `show`, in the order of their numbers in flash.
+    /// Reads all pages once per name: for a console, not for a control loop.
     ///
     /// # Errors
-    /// When the pages make no sense, or the flash does not obey. What was shown before is right.
+    /// When the pages are damaged or the flash fails. What was shown before is valid.
     pub async fn for_each(&mut self, mut show: impl FnMut(&str, AnyValue)) -> Result<(), LoadError<F::Error>> {
         let mut shown: Option<u32> = None;
         loop {
@@ -180,7 +189,7 @@ impl<F: NorFlash> ParameterStore<F> {
                 }
             }
             let Some(key) = next else { return Ok(()) };
-            // Items of a name lie there in the order they were saved; this finds the last one.
+            // Items of a name are in the order they were saved; this finds the last one.
             if let Some(Item { name, value }) = self.map.fetch_item(&mut scratch.0, &key).await? {
                 show(name, value);
             }
@@ -196,10 +205,11 @@ impl<F: NorFlash> ParameterStore<F> {
         }
     }
 
-    /// Forgets every value: all defaults apply again. Should the power fail in between, the next start finishes it.
+    /// Erases every value, so all defaults apply again. After a power cut in between, the next
+    /// start completes it.
     ///
     /// # Errors
-    /// When the flash does not obey.
+    /// When the flash fails.
     pub async fn erase(&mut self, _: Disarmed) -> Result<(), EraseError<F::Error>> {
         self.pages.format(self.map.flash()).await
     }

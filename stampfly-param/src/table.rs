@@ -40,7 +40,8 @@ impl<C, N: Number> Parameter<C, N> {
     }
 }
 
-/// A configuration with a table of its parameters. Implemented by [`parameters!`](crate::parameters!).
+/// A configuration with a table of its parameters. Implemented by
+/// [`parameters!`](crate::parameters!).
 ///
 /// ```
 /// use stampfly_param::{ParameterTable, parameters};
@@ -97,9 +98,10 @@ impl<N: Number, C: ParameterTable<N>> Parameters<N> for C {
 /// Declares the parameters of a vehicle: a table with one line each.
 ///
 /// # Structs made by the macro
-/// A line is `name = default in [min, max] "unit";` below its meaning. Lines stand in groups; each group becomes a struct,
-/// for the component that it configures, and all groups together a [message](crate::types::message!), so that the parameters in
-/// use can be a topic. Names are `group.name`. Rules follow behind `where`, as [`rules!`](crate::rules!) has them.
+/// A line is `name = default in [min, max] "unit";` below its meaning. Lines stand in groups; each
+/// group becomes a struct, for the component that it configures, and all groups together a
+/// [message](crate::types::message!), so that the parameters in use can be a topic. Names are
+/// `group.name`. Rules follow behind `where`, as [`rules!`](crate::rules!) has them.
 ///
 /// ```
 /// use stampfly_param::parameters;
@@ -134,9 +136,10 @@ impl<N: Number, C: ParameterTable<N>> Parameters<N> for C {
 /// ```
 ///
 /// # A struct of your own
-/// A line is `"name" = field in [min, max] "unit";` below its meaning. Without a name the parameter is called like the path to
-/// its field. A field is a [`ParameterField`](crate::ParameterField): a number, yes or no, a duration or an enumeration. A line
-/// that ends in `, in_flight` marks a parameter that may change [in flight](crate::ParameterInfo::in_flight). Rules follow behind
+/// A line is `"name" = field in [min, max] "unit";` below its meaning. Without a name the parameter
+/// is called like the path to its field. A field is a [`ParameterField`](crate::ParameterField): a
+/// number, yes or no, a duration or an enumeration. A line that ends in `, in_flight` marks a
+/// parameter that may change [in flight](crate::ParameterInfo::in_flight). Rules follow behind
 /// `where`, written there or as a constant. A struct of `f64` says `impl Config: f64`.
 ///
 /// ```
@@ -188,7 +191,8 @@ macro_rules! parameters {
                 fn default() -> Self { Self { $($name: $default),+ } }
             }
 
-            // The numbers of a group are one field of the message, because a message's own default is zeros.
+            // The numbers of a group are one field of the message, because a message's own default
+            // is zeros.
             impl $crate::types::Field for $Group {
                 const KIND: $crate::types::FieldKind = $crate::types::FieldKind::F32;
                 const COUNT: usize = [$($default),+].len();

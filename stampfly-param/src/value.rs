@@ -1,7 +1,8 @@
-//! What a store can keep: numbers of every size, yes or no, and up to 32 bytes of anything.
+//! Types of values in a store: numbers of every size, `bool`, and up to 32 bytes.
 //!
-//! Each value lies in flash with its kind and its name, so that it is never read as something it is not, and a store can be listed
-//! by who does not know what was saved. Enumerations are stored as the number that the program gives them; text as bytes.
+//! Each value is stored with its kind and its name, so it is never read as another type, and a
+//! store can be listed without knowing what was saved. Store an enumeration as a number and text as
+//! bytes.
 
 use core::fmt;
 use sequential_storage::map::{SerializationError, Value};
@@ -75,7 +76,8 @@ impl Kind {
     }
 }
 
-/// A type that a store can keep: `bool`, integers and floating-point numbers of up to 64 bits, `[u8; N]` of up to 32.
+/// A type that a store can keep: `bool`, integers and floating-point numbers of up to 64 bits,
+/// `[u8; N]` of up to 32.
 pub trait Storable: Copy + sealed::Sealed {
     /// Its kind.
     const KIND: Kind;
@@ -90,7 +92,8 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A stored value, whatever it is. Equal when kind and bits are: −0 is not 0, and the same NaN is the same.
+/// A stored value, whatever it is. Equal when kind and bits are: −0 is not 0, and the same NaN is
+/// the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnyValue {
     kind: Kind,

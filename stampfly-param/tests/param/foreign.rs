@@ -1,4 +1,5 @@
-//! Flash that somebody else has used becomes a store, whatever is in it and whenever the power fails.
+//! Flash that somebody else has used becomes a store, whatever is in it and whenever the power
+//! fails.
 
 use crate::flash::{self, Flash};
 use embassy_futures::block_on;
@@ -38,8 +39,9 @@ fn works(flash: Flash) {
     }
 }
 
-/// A page as ESP-IDF's NVS library leaves it: state, sequence number, version, checksum, a bitmap of two bits an entry,
-/// entries of 32 bytes. Layout: ESP-IDF Programming Guide, NVS Library, "Structure of a page".
+/// A page as ESP-IDF's NVS library leaves it: state, sequence number, version, checksum, a bitmap
+/// of two bits an entry, entries of 32 bytes. Layout: ESP-IDF Programming Guide, NVS Library,
+/// "Structure of a page".
 fn nvs_page(state: u32, number: u32, entries: usize, page: &mut [u8]) {
     page[..4].copy_from_slice(&state.to_le_bytes());
     page[4..8].copy_from_slice(&number.to_le_bytes());
@@ -99,7 +101,8 @@ fn whatever_was_there_is_erased() {
     }
 }
 
-/// A cut at every word of the formatting, clean and in the middle of the word, and cut again while it is repeated.
+/// A cut at every word of the formatting, clean and in the middle of the word, and cut again while
+/// it is repeated.
 #[test]
 fn no_power_cut_while_erasing_leaves_anything_behind() {
     for (what, image) in images() {

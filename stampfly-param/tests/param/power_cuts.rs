@@ -19,16 +19,18 @@ fn load(store: &mut ParameterStore<Flash>, name: &str) -> Option<f32> {
     block_on(store.load_within(name, -1e6..=1e6)).expect("a value or none")
 }
 
-/// Switches on, saves a value, and gives the flash back. `None` when the power failed while the store was opened.
+/// Switches on, saves a value, and gives the flash back. `None` when the power failed while the
+/// store was opened.
 fn life(flash: Flash, name: &str, value: f32) -> Option<(bool, Flash)> {
     let mut store = block_on(ParameterStore::open(flash, RANGE)).ok()?;
     let saved = save(&mut store, name, value);
     Some((saved, store.into_flash()))
 }
 
-/// Every cut is made from the flash as the writes before have left it: before every byte, and before every fourth, another one
-/// from write to write, once more with half of the bits of the rest of its word changed. After it every name has its last value,
-/// or the one being saved its new one, and saving goes on.
+/// Every cut is made from the flash as the writes before have left it: before every byte, and
+/// before every fourth, another one from write to write, once more with half of the bits of the
+/// rest of its word changed. After it every name has its last value, or the one being saved its new
+/// one, and saving goes on.
 #[test]
 fn no_cut_at_any_byte_of_a_thousand_writes_loses_a_value() {
     let mut flash = block_on(ParameterStore::open(Flash::new(), RANGE)).expect("five pages").into_flash();

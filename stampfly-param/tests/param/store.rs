@@ -112,7 +112,8 @@ fn a_flash_that_keeps_nothing_is_found_out() {
     assert_eq!(load(&mut store, "hover.thrust"), Ok(Some(1.0)));
 }
 
-/// Bytes are kept whole: after every cut they are those before or those after, and other values are as they were.
+/// Bytes are kept whole: after every cut they are those before or those after, and other values are
+/// as they were.
 #[test]
 fn no_power_cut_mixes_bytes() {
     let mut at_work = store(Flash::new());
@@ -148,15 +149,16 @@ fn no_power_cut_mixes_bytes() {
     }
 }
 
-/// Enough changes to go round all pages, so that every kind of write and every erasure is among what is cut.
+/// Enough changes to go round all pages, so that every kind of write and every erasure is among
+/// what is cut.
 const CHANGES: usize = 120;
 
 fn change(index: usize) -> (&'static str, f32) {
     (NAMES[index * index % NAMES.len()], index as f32 + 0.5)
 }
 
-/// Cuts the power at every word of a long life, cleanly and in the middle of the word. After each cut every name has its
-/// last value, or for the one being saved the new one, and life goes on.
+/// Cuts the power at every word of a long life, cleanly and in the middle of the word. After each
+/// cut every name has its last value, or for the one being saved the new one, and life goes on.
 #[test]
 fn no_power_cut_loses_a_value() {
     let opened = store(Flash::new()).into_flash();
@@ -219,7 +221,8 @@ fn no_power_cut_makes_erasing_invent_a_value() {
 }
 
 proptest! {
-    /// Bits that have fallen over: a value may be gone, but what is loaded was once saved, and erasing always helps.
+    /// Bits that have fallen over: a value may be gone, but what is loaded was once saved, and
+    /// erasing always helps.
     #[test]
     fn damaged_flash_invents_nothing(flips in prop::collection::vec((0usize..1280, 0u8..8), 1..40)) {
         let mut at_work = store(Flash::new());
