@@ -3,11 +3,11 @@
 //! Everything but moving the bytes: firmware, which has the radio, gives [`Link`] what it has received and sends what [`Link::transmit`] returns. Stations with the vehicle's key speak in sealed frames,
 //! others, where the configuration lets them, in the ecosystem's packets. The link follows `flight_status`, and publishes the transmitter it is paired with.
 //!
-//! Who commands is the [`Helm`]'s decision, the same one that services ask: a station has a seat of its own, [`Seat::Link`], and the paired transmitter
-//! [`Seat::Transmitter`]. A station whose command or sticks are refused is told who commands, and a station in session is told what others ask of the vehicle.
+//! Who commands is the [`CommandArbiter`]'s decision, the same one that services ask: a station has a requester of its own, [`Requester::Link`], and the paired transmitter
+//! [`Requester::Transmitter`]. A station whose command or sticks are refused is told who commands, and a station in session is told what others ask of the vehicle.
 //!
 //! A command is acknowledged when the vehicle's state shows that it has happened, as at a cable,
-//! and refused with the reason when it does not: see [`deed`](stampfly_services::deed).
+//! and refused with the reason when it does not: see [`goal`](stampfly_services::goal).
 
 use crate::messages::TelemetryFrame;
 use crate::topics::{Id, LinkEnds};
@@ -15,8 +15,8 @@ use core::fmt::{Display, Write as _};
 use heapless::String;
 use stampfly_link::secure::{Guarded, Heard, Held, MAX_FRAME, NotTaken, Payload, Received, Sample, put};
 use stampfly_link::{Address, TelemetryPacket};
-use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
-use stampfly_services::{Helm, Passed, Refusal, Seat, Told};
+use stampfly_services::goal::{CommandGoal, OVERTAKEN, TOO_MANY, Waited};
+use stampfly_services::{CommandArbiter, CommandNotice, Passed, Refusal, Requester};
 use stampfly_types::messages::{Alerts, ArmBlocks, FlightStatus, GuidedCommand, PilotInput};
 use stampfly_types::{Duration, Instant, Message};
 
@@ -27,7 +27,7 @@ pub const PERIOD: Duration = Duration::from_millis(20);
 const SENSOR_ERROR: Alerts =
     Alerts::IMU_DEGRADED.with(Alerts::IMU_LOST).with(Alerts::TOF_LOST).with(Alerts::POWER_LOST);
 
-/// Stations whose seats are remembered: one that comes back is the same again.
+/// Stations whose requesters are remembered: one that comes back is the same again.
 const STATIONS: usize = 4;
 /// Between two answers to sticks that are refused: they come fifty times a second.
 const STICKS_AGAIN: Duration = Duration::from_secs(2);
@@ -59,9 +59,9 @@ impl Refused {
 /// The newest request of another client, for the station.
 #[derive(Clone, Copy, Debug, Default)]
 struct Notice {
-    /// The number of the newest one in the helm that was taken, and what it is.
+    /// The number of the newest one in the arbiter that was taken, and what it is.
     number: u32,
-    told: Option<Told>,
+    told: Option<CommandNotice>,
     /// How often it was said, and turns since then.
     said: u8,
     turns: u8,
@@ -73,8 +73,8 @@ pub struct Link<'b> {
     pub guarded: Guarded,
     pub(crate) ends: LinkEnds<'b>,
     counter: u8,
-    /// Where stations are, and their seats, the newest first.
-    stations: [Option<(Address, Seat)>; STATIONS],
+    /// Where stations are, and their requesters, the newest first.
+    stations: [Option<(Address, Requester)>; STATIONS],
     refused: Option<Refused>,
     /// The newest command with a number that was refused, and why: it is refused again when it is
     /// said again.
@@ -120,26 +120,26 @@ impl<'b> Link<'b> {
         }
     }
 
-    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands as far as the helm lets them through. What else a station with the
-    /// key has sent is returned, for a `RadioDesk` of `stampfly-services`, whose answers `guarded` seals.
+    /// Takes what a station has sent, `at` the instant it came in, and publishes sticks and commands as far as the arbiter lets them through. What else a station with the
+    /// key has sent is returned, for a `RadioRequests` of `stampfly-services`, whose answers `guarded` seals.
     ///
     /// # Errors
     /// When it is refused. The session has counted it; nothing is published.
     pub fn receive<'f>(
         &mut self,
-        helm: &mut Helm,
+        arbiter: &mut CommandArbiter,
         at: Instant,
         source: Address,
         bytes: &'f mut [u8],
     ) -> Result<Option<Received<'f>>, NotTaken> {
         let before = self.guarded.session().peer();
-        let is_led = self.status().armed && helm.commander() == Some(Seat::Transmitter);
+        let is_led = self.status().armed && arbiter.commander() == Some(Requester::Transmitter);
         self.guarded.set_led(is_led);
         match self.guarded.receive(at, source, bytes)? {
-            Heard::Authentic(received) => Ok(self.obey(helm, at, source, received)),
+            Heard::Authentic(received) => Ok(self.obey(arbiter, at, source, received)),
             Heard::Unauthenticated(input) => {
                 // It has no ear for an answer.
-                _ = self.steer(helm, at, Seat::Transmitter, &input);
+                _ = self.steer(arbiter, at, Requester::Transmitter, &input);
                 if let Some(peer) = self.guarded.session().peer().filter(|peer| Some(*peer) != before) {
                     self.ends.link_peer.publish(at, &peer.into());
                 }
@@ -155,33 +155,33 @@ impl<'b> Link<'b> {
     /// When it is none of a station with the key.
     pub fn receive_sealed<'f>(
         &mut self,
-        helm: &mut Helm,
+        arbiter: &mut CommandArbiter,
         at: Instant,
         source: Address,
         frame: &'f mut [u8],
     ) -> Result<Option<Received<'f>>, NotTaken> {
         match self.guarded.receive_sealed(at, source, frame)? {
-            Heard::Authentic(received) => Ok(self.obey(helm, at, source, received)),
+            Heard::Authentic(received) => Ok(self.obey(arbiter, at, source, received)),
             Heard::Unauthenticated(_) | Heard::Handshake => Ok(None),
         }
     }
 
-    /// Publishes what a station with the key has sent, if the helm lets it through, and returns what is no command.
+    /// Publishes what a station with the key has sent, if the arbiter lets it through, and returns what is no command.
     fn obey<'f>(
         &mut self,
-        helm: &mut Helm,
+        arbiter: &mut CommandArbiter,
         at: Instant,
         source: Address,
         received: Received<'f>,
     ) -> Option<Received<'f>> {
-        let seat = self.seat(helm, source);
+        let requester = self.requester(arbiter, source);
         let counter = match received.payload {
             Payload::Numbered { number, .. } => number,
             _ => received.counter,
         };
         if let Payload::Sticks(input) = received.payload {
             let is_due = self.sticks_refused.is_none_or(|last| at.since(last) >= STICKS_AGAIN);
-            match self.steer(helm, at, seat, &input) {
+            match self.steer(arbiter, at, requester, &input) {
                 // The refusal of a command waits to be sent, and is not overwritten.
                 Err(why) if is_due && self.refused.is_none() => {
                     (self.sticks_refused, self.refused) = (Some(at), Some(Refused::new(counter, &why, 1)));
@@ -192,13 +192,13 @@ impl<'b> Link<'b> {
             return None;
         }
         let Some(command) = received.payload.command() else { return Some(received) };
-        match Deed::of(command.kind) {
+        match CommandGoal::of(command.kind) {
             // A sign of life, which takes nothing over. The commander's is passed on as it comes.
             None => {
-                let taken = helm.alive(at, seat) && self.command(at, command);
+                let taken = arbiter.alive(at, requester) && self.command(at, command);
                 self.guarded.acknowledge(&received, taken);
             }
-            Some(deed) => self.guide(helm, (at, seat), (counter, deed), &received, command),
+            Some(goal) => self.guide(arbiter, (at, requester), (counter, goal), &received, command),
         }
         None
     }
@@ -206,34 +206,34 @@ impl<'b> Link<'b> {
     /// A command: is refused with the reason, or waits to be seen done.
     fn guide(
         &mut self,
-        helm: &mut Helm,
-        (at, seat): (Instant, Seat),
-        (counter, deed): (u32, Deed),
+        arbiter: &mut CommandArbiter,
+        (at, requester): (Instant, Requester),
+        (counter, goal): (u32, CommandGoal),
         received: &Received<'_>,
         command: GuidedCommand,
     ) {
         let is_numbered = matches!(received.payload, Payload::Numbered { .. });
         let denied = self.denied.as_ref().filter(|(denied, _)| is_numbered && *denied == counter);
         // A command that ends a flight is done whenever it arrives.
-        if let Some((_, why)) = denied.filter(|_| !deed.ends_a_flight()) {
+        if let Some((_, why)) = denied.filter(|_| !goal.ends_a_flight()) {
             // The station repeats it until it receives the refusal. The refusal stands when the
             // vehicle's state has changed since: it may be on its way.
             self.refused = Some(Refused::new(counter, why, 1));
             return;
         }
         // The refusal names the commander rather than the state of the vehicle.
-        if let Some(holder) = helm.holder(at).filter(|holder| *holder != seat && !deed.ends_a_flight()) {
+        if let Some(holder) = arbiter.holder(at).filter(|holder| *holder != requester && !goal.ends_a_flight()) {
             return self.deny(counter, is_numbered, &Refusal::Occupied(holder));
         }
         let mut words = String::<TEXT>::new();
-        if deed.refuse(&self.status(), &mut words) {
+        if goal.refuse(&self.status(), &mut words) {
             return self.deny(counter, is_numbered, &words);
         }
-        if !deed.ends_a_flight() && self.waits.iter().all(Option::is_some) {
+        if !goal.ends_a_flight() && self.waits.iter().all(Option::is_some) {
             return self.deny(counter, is_numbered, &TOO_MANY);
         }
-        let waited = Waited::with(at, deed, self.refusals());
-        match helm.guide(at, seat, command, &mut |passed| self.pass(at, passed)) {
+        let waited = Waited::with(at, goal, self.refusals());
+        match arbiter.guide(at, requester, command, &mut |passed| self.pass(at, passed)) {
             Ok(()) => {
                 // A free place, or the oldest one's.
                 let place = self.waits.iter_mut().min_by_key(|place| place.map(|(_, waited)| waited.since()));
@@ -286,29 +286,35 @@ impl<'b> Link<'b> {
         self.ends.arm_refusals.latest().map_or(0, |sample| sample.data.attempts)
     }
 
-    /// Follows the vehicle's state, and passes the signs of life of the seat that has the lease on. The firmware's radio calls it every 20 ms, beside the console's
+    /// Follows the vehicle's state, and passes the signs of life of the requester that has the lease on. The firmware's radio calls it every 20 ms, beside the console's
     /// services, which may have to wait.
-    pub fn keep(&mut self, helm: &mut Helm, now: Instant) {
+    pub fn keep(&mut self, arbiter: &mut CommandArbiter, now: Instant) {
         let armed = self.status().armed;
-        helm.keep(now, armed, &mut |passed| self.pass(now, passed));
+        arbiter.keep(now, armed, &mut |passed| self.pass(now, passed));
     }
 
-    /// The seat of a station that is there.
-    fn seat(&mut self, helm: &mut Helm, source: Address) -> Seat {
+    /// The requester of a station that is there.
+    fn requester(&mut self, arbiter: &mut CommandArbiter, source: Address) -> Requester {
         let known = self.stations.iter().flatten().find(|(station, _)| *station == source);
-        if let Some((_, seat)) = known {
-            return *seat;
+        if let Some((_, requester)) = known {
+            return *requester;
         }
-        let seat = Seat::Link(helm.connection());
+        let requester = Requester::Link(arbiter.connection());
         self.stations.rotate_right(1);
         let [newest, ..] = &mut self.stations;
-        *newest = Some((source, seat));
-        seat
+        *newest = Some((source, requester));
+        requester
     }
 
-    fn steer(&mut self, helm: &mut Helm, at: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
+    fn steer(
+        &mut self,
+        arbiter: &mut CommandArbiter,
+        at: Instant,
+        requester: Requester,
+        input: &PilotInput,
+    ) -> Result<(), Refusal> {
         let status = self.status();
-        helm.steer(at, seat, input, &status, &mut |passed| self.pass(at, passed))
+        arbiter.steer(at, requester, input, &status, &mut |passed| self.pass(at, passed))
     }
 
     fn pass(&mut self, at: Instant, passed: Passed) -> Result<(), Refusal> {
@@ -329,14 +335,14 @@ impl<'b> Link<'b> {
     /// Seals what the station is to be told of what was asked of the vehicle, and by whom. Ask every 20 ms or so.
     pub fn notice<'r>(
         &mut self,
-        helm: &Helm,
+        arbiter: &CommandArbiter,
         now: Instant,
         room: &'r mut [u8; MAX_FRAME],
     ) -> Option<(Address, &'r [u8])> {
         let notice = &mut self.notice;
         notice.turns = notice.turns.saturating_add(1);
         let is_over = notice.said >= NOTICES || notice.told.is_none();
-        if let Some((number, told)) = helm.told(notice.number).filter(|_| is_over || notice.said > 0) {
+        if let Some((number, told)) = arbiter.told(notice.number).filter(|_| is_over || notice.said > 0) {
             // What is new goes before what is said again.
             *notice = Notice { number, told: Some(told), said: 0, turns: NOTICE_TURNS };
         }

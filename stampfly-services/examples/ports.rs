@@ -7,7 +7,7 @@ use stampfly_link::secure::Key;
 use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_services::mavlink::Identity;
 use stampfly_services::network::{Client, Ends, Heard, Ports};
-use stampfly_services::{Cockpit, Connection, Places, Refusal, Samples, Seat, View};
+use stampfly_services::{Connection, Places, Refusal, Requester, Samples, VehicleAccess, View};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 use std::cell::RefCell;
@@ -71,12 +71,12 @@ impl Parameters for Vehicle {
     }
 }
 
-impl Cockpit for Vehicle {
+impl VehicleAccess for Vehicle {
     fn view(&self) -> View<'_> {
         View::new(&Nothing, &self.places)
     }
 
-    fn guide(&mut self, _: Instant, _: Seat, _: GuidedCommand) -> Result<(), Refusal> {
+    fn guide(&mut self, _: Instant, _: Requester, _: GuidedCommand) -> Result<(), Refusal> {
         self.commands += 1;
         Ok(())
     }
@@ -86,13 +86,13 @@ impl Cockpit for Vehicle {
         self.connections
     }
 
-    fn leave(&mut self, _: &dyn Fn(Seat) -> bool) {}
+    fn leave(&mut self, _: &dyn Fn(Requester) -> bool) {}
 
-    fn steer(&mut self, _: Instant, _: Seat, _: &PilotInput) -> Result<(), Refusal> {
+    fn steer(&mut self, _: Instant, _: Requester, _: &PilotInput) -> Result<(), Refusal> {
         Ok(())
     }
 
-    fn alive(&mut self, _: Instant, _: Seat) {}
+    fn alive(&mut self, _: Instant, _: Requester) {}
 
     fn parameters(&mut self) -> &mut dyn Parameters {
         self

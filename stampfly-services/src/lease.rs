@@ -8,7 +8,7 @@
 //! a flight: some are sent as long as a page is open. Whose sticks reach the vehicle is decided in
 //! `stick_source.rs`.
 
-use crate::refusal::{Refusal, Seat};
+use crate::refusal::{Refusal, Requester};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant};
 
@@ -32,11 +32,11 @@ pub(crate) fn is_sane(command: &GuidedCommand) -> bool {
 /// Who commands.
 ///
 /// ```
-/// use stampfly_services::{Lease, Refusal, Seat};
+/// use stampfly_services::{Lease, Refusal, Requester};
 /// use stampfly_types::{Instant, messages::{GuidedCommand, GuidedKind}};
 /// let command = |kind| GuidedCommand { kind, ..Default::default() };
 /// let mut lease = Lease::new();
-/// let (one, two) = (Seat::Page(1), Seat::Page(2));
+/// let (one, two) = (Requester::Page(1), Requester::Page(2));
 /// assert_eq!(lease.ask(Instant::ZERO, one, &command(GuidedKind::Arm)), Ok(()));
 /// let refused = lease.ask(Instant::ZERO, two, &command(GuidedKind::WayPoint));
 /// assert_eq!(refused, Err(Refusal::Occupied(one)));
@@ -46,7 +46,7 @@ pub(crate) fn is_sane(command: &GuidedCommand) -> bool {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lease {
-    holder: Option<Seat>,
+    holder: Option<Requester>,
     /// Its connection has ended.
     has_left: bool,
     /// When the holder was heard last; without a holder, any program.
@@ -64,25 +64,25 @@ impl Lease {
 
     /// Who commands.
     #[must_use]
-    pub fn holder(&self, now: Instant) -> Option<Seat> {
+    pub fn holder(&self, now: Instant) -> Option<Requester> {
         self.holder.filter(|_| !self.has_left && self.is_heard(now))
     }
 
     /// Who has taken the lease of this flight and has not left, heard or not.
     #[must_use]
-    pub fn commander(&self) -> Option<Seat> {
+    pub fn commander(&self) -> Option<Requester> {
         self.holder.filter(|_| !self.has_left)
     }
 
     /// Who has taken the lease of this flight, heard or not, there or not.
-    pub(crate) const fn taker(&self) -> Option<Seat> {
+    pub(crate) const fn taker(&self) -> Option<Requester> {
         self.holder
     }
 
     /// Do this one's signs of life count?
     #[must_use]
-    pub fn is_holders(&self, seat: Seat) -> bool {
-        self.holder.is_none_or(|holder| holder == seat)
+    pub fn is_holders(&self, requester: Requester) -> bool {
+        self.holder.is_none_or(|holder| holder == requester)
     }
 
     /// May this be passed on to the vehicle? A program that asks for more than a kill has the lease
@@ -90,19 +90,19 @@ impl Lease {
     ///
     /// # Errors
     /// When another program has it, or a number is none.
-    pub fn ask(&mut self, now: Instant, seat: Seat, command: &GuidedCommand) -> Result<(), Refusal> {
+    pub fn ask(&mut self, now: Instant, requester: Requester, command: &GuidedCommand) -> Result<(), Refusal> {
         if matches!(command.kind, GuidedKind::Kill) {
             return Ok(());
         }
         if !is_sane(command) {
             return Err(Refusal::Range);
         }
-        match self.holder(now).filter(|holder| *holder != seat) {
+        match self.holder(now).filter(|holder| *holder != requester) {
             // The holder goes on commanding, to a vehicle that lands.
             Some(_) if matches!(command.kind, GuidedKind::Land | GuidedKind::Disarm) => Ok(()),
             Some(holder) => Err(Refusal::Occupied(holder)),
             None => {
-                (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
+                (self.holder, self.heard, self.has_left) = (Some(requester), Some(now), false);
                 Ok(())
             }
         }
@@ -112,32 +112,32 @@ impl Lease {
     ///
     /// # Errors
     /// When another program has the lease, or had it last in this flight.
-    pub fn steer(&mut self, now: Instant, seat: Seat) -> Result<(), Refusal> {
+    pub fn steer(&mut self, now: Instant, requester: Requester) -> Result<(), Refusal> {
         match self.holder {
-            Some(holder) if holder != seat => Err(Refusal::Occupied(holder)),
+            Some(holder) if holder != requester => Err(Refusal::Occupied(holder)),
             _ => {
-                (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
+                (self.holder, self.heard, self.has_left) = (Some(requester), Some(now), false);
                 Ok(())
             }
         }
     }
 
     /// It commands from now on, whoever did before: the mode machine has let it take over.
-    pub fn take(&mut self, now: Instant, seat: Seat) {
-        (self.holder, self.heard, self.has_left) = (Some(seat), Some(now), false);
+    pub fn take(&mut self, now: Instant, requester: Requester) {
+        (self.holder, self.heard, self.has_left) = (Some(requester), Some(now), false);
     }
 
     /// Its connection has ended. Another may take the lease at once; until one does, the vehicle's
     /// failsafe hears nothing.
-    pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
+    pub fn leave(&mut self, has_left: impl Fn(Requester) -> bool) {
         self.has_left |= self.holder.is_some_and(has_left);
     }
 
     /// A program is there. While a vehicle is commanded, only its commander's signs of life count,
     /// also after a silence: the vehicle's failsafe has to notice that the commander is gone,
     /// however many watch. Before there is one, every program's count.
-    pub fn alive(&mut self, now: Instant, seat: Seat) {
-        if self.is_holders(seat) {
+    pub fn alive(&mut self, now: Instant, requester: Requester) {
+        if self.is_holders(requester) {
             // A page whose connection broke has come again.
             (self.heard, self.has_left) = (Some(now), false);
         }
@@ -151,7 +151,7 @@ impl Lease {
     /// Must a sign of life be passed on to the vehicle now? Ask at least every [`LIFE`].
     pub fn is_sign_due(&mut self, now: Instant) -> bool {
         // A transmitter's frames are what the failsafe hears of it.
-        let is_there = self.is_heard(now) && self.holder != Some(Seat::Transmitter);
+        let is_there = self.is_heard(now) && self.holder != Some(Requester::Transmitter);
         let due = is_there && self.passed.is_none_or(|passed| now.since(passed) >= LIFE);
         if due {
             self.passed = Some(now);
@@ -169,9 +169,9 @@ mod tests {
     use super::*;
     use stampfly_types::Vec3;
 
-    const ONE: Seat = Seat::Mavlink { connection: 1, system: 255, component: 190 };
+    const ONE: Requester = Requester::Mavlink { connection: 1, system: 255, component: 190 };
     /// Of the same numbers, at another connection.
-    const TWO: Seat = Seat::Mavlink { connection: 2, system: 255, component: 190 };
+    const TWO: Requester = Requester::Mavlink { connection: 2, system: 255, component: 190 };
 
     fn command(kind: GuidedKind) -> GuidedCommand {
         GuidedCommand { kind, ..Default::default() }
@@ -179,8 +179,12 @@ mod tests {
 
     #[test]
     fn a_watcher_does_not_keep_the_lease_of_a_silent_commander() {
-        for watcher in [TWO, Seat::Mavlink { connection: 1, system: 255, component: 191 }, Seat::Page(1), Seat::Link(1)]
-        {
+        for watcher in [
+            TWO,
+            Requester::Mavlink { connection: 1, system: 255, component: 191 },
+            Requester::Page(1),
+            Requester::Link(1),
+        ] {
             let mut lease = Lease::new();
             assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
             for ms in (0..3_000).step_by(500) {
@@ -207,9 +211,9 @@ mod tests {
     fn a_commander_whose_connection_ends_makes_room_and_is_not_heard_any_more() {
         let mut lease = Lease::new();
         assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
-        lease.leave(|seat| seat.is_at(2));
+        lease.leave(|requester| requester.is_at(2));
         assert_eq!(lease.holder(Instant::ZERO), Some(ONE), "another has left");
-        lease.leave(|seat| seat.is_at(1));
+        lease.leave(|requester| requester.is_at(1));
         for ms in (100..10_000).step_by(100) {
             let now = Instant::from_millis(ms);
             lease.alive(now, TWO);
@@ -221,7 +225,7 @@ mod tests {
 
         let mut lease = Lease::new();
         assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
-        lease.leave(|seat| seat.is_at(1));
+        lease.leave(|requester| requester.is_at(1));
         assert_eq!(lease.ask(Instant::ZERO, TWO, &command(GuidedKind::Hold)), Ok(()), "at once");
     }
 
@@ -254,7 +258,7 @@ mod tests {
         let mut lease = Lease::new();
         assert_eq!(lease.ask(Instant::ZERO, ONE, &command(GuidedKind::TakeOff)), Ok(()));
         for kind in [GuidedKind::Land, GuidedKind::Disarm, GuidedKind::Kill] {
-            assert_eq!(lease.ask(Instant::ZERO, Seat::Console, &command(kind)), Ok(()));
+            assert_eq!(lease.ask(Instant::ZERO, Requester::Console, &command(kind)), Ok(()));
         }
         assert_eq!(lease.holder(Instant::ZERO), Some(ONE));
         lease.release();

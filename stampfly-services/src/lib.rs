@@ -3,15 +3,15 @@
 //! # The parts
 //! | module | what it is |
 //! |---|---|
-//! | [`cockpit`] | what a service sees of a vehicle, and what it may ask for |
-//! | [`helm`] | the part of a cockpit that is the same for every vehicle |
-//! | [`desk`] | a station's questions for parameters, and its lines of the console |
-//! | [`radio_desk`] | the same over the secure link, and topics that a station wants to see |
+//! | [`access`] | the interface between a service and a vehicle |
+//! | [`arbiter`] | which requester commands, for every vehicle |
+//! | [`requests`] | parameters and console lines that a station requests |
+//! | [`radio_requests`] | the same over the secure link, and the topics that a station watches |
 //! | [`view`] | the newest sample of what every vehicle publishes, whatever its topic table |
 //! | [`watches`] | the topics that a station wants to see, and when each is due |
-//! | [`lease`] | one seat at a time commands: a page, a program, a station with the key, a transmitter |
+//! | [`lease`] | one requester at a time commands: a page, a program, a station with the key, a transmitter |
 //! | [`mission`] | steps that a vehicle flies one after the other |
-//! | [`tape`] | who is sent the flight record |
+//! | [`subscription`] | streams the flight record to one station at a time |
 //! | [`telemetry`] | a packet for whoever listens, fifty times a second |
 //! | [`data_stream`] | every control cycle, for whoever asked for it |
 //! | [`tello`] | the text commands of a Tello, and its state |
@@ -28,14 +28,13 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod access;
+pub mod arbiter;
 pub mod association;
 #[cfg(feature = "mavlink")]
 pub mod cable;
-pub mod cockpit;
 pub mod data_stream;
-pub mod deed;
-pub mod desk;
-pub mod helm;
+pub mod goal;
 pub mod lease;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
@@ -43,24 +42,25 @@ pub mod mission;
 pub mod msp;
 #[cfg(feature = "mavlink")]
 pub mod network;
-pub mod radio_desk;
+pub mod radio_requests;
 mod refusal;
+pub mod requests;
 mod stick_source;
-pub mod tape;
+pub mod subscription;
 pub mod telemetry;
 pub mod tello;
 mod version;
 pub mod view;
 pub mod watches;
 
-pub use cockpit::{Cockpit, Request};
+pub use access::{Request, VehicleAccess};
+pub use arbiter::{ArbitratedAccess, Asked, CommandArbiter, CommandNotice, Pass, Passed, VehicleActions};
 pub use data_stream::DataStream;
-pub use desk::Desk;
-pub use helm::{Asked, Hands, Helm, Pass, Passed, Seated, Told};
 pub use lease::Lease;
-pub use radio_desk::RadioDesk;
-pub use refusal::{Connection, Refusal, Seat};
-pub use tape::Tape;
+pub use radio_requests::RadioRequests;
+pub use refusal::{Connection, Refusal, Requester};
+pub use requests::StationRequests;
+pub use subscription::RecordSubscription;
 pub use telemetry::Telemetry;
 pub use tello::Tello;
 pub use version::version;

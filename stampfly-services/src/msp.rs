@@ -9,7 +9,7 @@
 //!
 //! Payloads are from the descriptions of [MultiWii](http://www.multiwii.com/wiki/index.php?title=Multiwii_Serial_Protocol) and Betaflight.
 
-use crate::cockpit::{Cockpit, Request};
+use crate::access::{Request, VehicleAccess};
 use core::f32::consts::PI;
 use heapless::Vec;
 use stampfly_link::msp::{Direction, MspDecoder, MspFrame};
@@ -190,14 +190,20 @@ impl Msp {
     }
 
     /// Takes what was heard, and answers each question in it.
-    pub fn hear(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: &mut dyn FnMut(&[u8])) {
-        self.hear_any(now, false, bytes, cockpit, put);
+    pub fn hear(&mut self, now: Instant, bytes: &[u8], access: &mut dyn VehicleAccess, put: &mut dyn FnMut(&[u8])) {
+        self.hear_any(now, false, bytes, access, put);
     }
 
     /// The same of what lay in the caller's queue for more than a second: what would change
     /// something is answered with an error, and changes nothing.
-    pub fn hear_late(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: &mut dyn FnMut(&[u8])) {
-        self.hear_any(now, true, bytes, cockpit, put);
+    pub fn hear_late(
+        &mut self,
+        now: Instant,
+        bytes: &[u8],
+        access: &mut dyn VehicleAccess,
+        put: &mut dyn FnMut(&[u8]),
+    ) {
+        self.hear_any(now, true, bytes, access, put);
     }
 
     fn hear_any(
@@ -205,7 +211,7 @@ impl Msp {
         now: Instant,
         is_late: bool,
         bytes: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: &mut dyn FnMut(&[u8]),
     ) {
         if now.since(self.heard) >= SILENCE {
@@ -216,7 +222,7 @@ impl Msp {
         for byte in bytes {
             match self.decoder.feed(*byte) {
                 Some(asked) if asked.direction != Direction::Request => {}
-                Some(asked) => say(&asked, answer(now, is_late, card, &asked, cockpit), put),
+                Some(asked) => say(&asked, answer(now, is_late, card, &asked, access), put),
                 // One that there is no room for is none that is known here.
                 None => {
                     let asked = self.decoder.too_long().filter(|frame| frame.direction == Direction::Request);
@@ -244,23 +250,23 @@ fn answer(
     is_late: bool,
     card: &Card,
     asked: &MspFrame<'_>,
-    cockpit: &mut dyn Cockpit,
+    access: &mut dyn VehicleAccess,
 ) -> Option<Payload> {
     let empty = Payload::new();
-    let status = cockpit.view().state();
+    let status = access.view().state();
     let changes = !status.armed && !is_late;
     match asked.id {
         // SET_PID, SET_MISC, RESET_CONF, BIND of MultiWii, SET_REBOOT, EEPROM_WRITE, SELECT_SETTING of the only profile.
-        202 if changes => set_pids(card, asked.payload, cockpit.parameters()).then_some(empty),
-        207 if changes => set_misc(&card.misc?, asked.payload, cockpit.parameters()).then_some(empty),
-        208 if changes => cockpit.request(now, Request::ResetParameters).is_ok().then_some(empty),
-        241 if changes => cockpit.request(now, Request::Bind).is_ok().then_some(empty),
-        68 if changes => cockpit.request(now, Request::Restart).is_ok().then_some(empty),
-        250 if changes => cockpit.request(now, Request::SaveParameters).is_ok().then_some(empty),
+        202 if changes => set_pids(card, asked.payload, access.parameters()).then_some(empty),
+        207 if changes => set_misc(&card.misc?, asked.payload, access.parameters()).then_some(empty),
+        208 if changes => access.request(now, Request::ResetParameters).is_ok().then_some(empty),
+        241 if changes => access.request(now, Request::Bind).is_ok().then_some(empty),
+        68 if changes => access.request(now, Request::Restart).is_ok().then_some(empty),
+        250 if changes => access.request(now, Request::SaveParameters).is_ok().then_some(empty),
         210 if changes && asked.payload == [0] => Some(empty),
-        112 => Some(pids(card, cockpit.parameters())),
-        114 if card.misc.is_some() => Some(misc(&card.misc?, cockpit.parameters())),
-        _ => identity(card, asked.id).or_else(|| state(card, asked.id, &status, cockpit)),
+        112 => Some(pids(card, access.parameters())),
+        114 if card.misc.is_some() => Some(misc(&card.misc?, access.parameters())),
+        _ => identity(card, asked.id).or_else(|| state(card, asked.id, &status, access)),
     }
 }
 
@@ -299,8 +305,8 @@ fn identity(card: &Card, id: u16) -> Option<Payload> {
 }
 
 /// What it does at the moment. Zeros for what it does not know.
-fn state(card: &Card, id: u16, status: &FlightStatus, cockpit: &dyn Cockpit) -> Option<Payload> {
-    let (empty, view) = (Payload::new(), cockpit.view());
+fn state(card: &Card, id: u16, status: &FlightStatus, access: &dyn VehicleAccess) -> Option<Payload> {
+    let (empty, view) = (Payload::new(), access.view());
     let estimate = view.estimate().map(|(_, estimate)| estimate).unwrap_or_default();
     let power = view.power().map(|(_, power)| power).unwrap_or_default();
     Some(match id {

@@ -11,7 +11,7 @@ pub type Connection = u32;
 /// it has. Another that calls itself the same is another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Seat {
+pub enum Requester {
     /// A page of the ground station, by its number.
     Page(u32),
     /// A program that speaks MAVLink. Routers put several on one connection; they have other
@@ -35,7 +35,7 @@ pub enum Seat {
     Transmitter,
 }
 
-impl Seat {
+impl Requester {
     /// Is it at this connection of MAVLink?
     #[must_use]
     pub const fn is_at(&self, at: Connection) -> bool {
@@ -43,7 +43,7 @@ impl Seat {
     }
 }
 
-impl fmt::Display for Seat {
+impl fmt::Display for Requester {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Page(number) => write!(f, "page {number}"),
@@ -63,7 +63,7 @@ impl fmt::Display for Seat {
 #[non_exhaustive]
 pub enum Refusal {
     /// Another program commands.
-    Occupied(Seat),
+    Occupied(Requester),
     /// A pilot flies the vehicle.
     PilotFlies,
     /// The vehicle takes no more commands at the moment.
@@ -79,7 +79,7 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Occupied(seat) => write!(f, "{seat} commands"),
+            Self::Occupied(requester) => write!(f, "{requester} commands"),
             Self::PilotFlies => f.write_str("a pilot flies by hand"),
             Self::Full => f.write_str("the vehicle takes no more commands at the moment"),
             Self::Range => f.write_str("a number is out of range"),

@@ -7,14 +7,14 @@
 //! | the vehicle | whose sticks are passed on |
 //! |---|---|
 //! | is disarmed | those of the source that came first, until it is silent, or another's arm switch is turned on |
-//! | is armed | those of the seat that has the lease; if none has it, those of a seat whose arm switch is on, which takes it |
+//! | is armed | those of the requester that has the lease; if none has it, those of a requester whose arm switch is on, which takes it |
 //! | is armed, and a program commands | also the paired transmitter's: its pilot takes over by acting, as the mode machine decides, and has the lease then |
 //!
 //! A kill is passed on from every source. An arm switch that is turned off in a frame that is not
 //! passed on is a command to land.
 
 use crate::lease::{Lease, SILENCE};
-use crate::refusal::{Refusal, Seat};
+use crate::refusal::{Refusal, Requester};
 use stampfly_types::Instant;
 use stampfly_types::messages::{CommandSource, FlightStatus, PilotInput};
 
@@ -30,16 +30,16 @@ pub(crate) enum Verdict {
     Flies,
     /// It is passed on, and the mode machine decides.
     Passes,
-    /// It is not passed on, because of this seat.
-    Refused(Seat),
+    /// It is not passed on, because of this requester.
+    Refused(Requester),
     /// The same, and it asks for a landing.
-    Lands(Seat),
+    Lands(Requester),
 }
 
 /// A source of sticks, and when its newest frame came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Source {
-    seat: Seat,
+    requester: Requester,
     heard: Instant,
     arm: bool,
 }
@@ -58,44 +58,44 @@ impl StickSource {
         Self { source: None, others: [None; OTHERS] }
     }
 
-    /// Looks at a frame, and takes the lease for its seat if it flies the vehicle.
+    /// Looks at a frame, and takes the lease for its requester if it flies the vehicle.
     pub fn judge(
         &mut self,
         now: Instant,
-        seat: Seat,
+        requester: Requester,
         input: &PilotInput,
         status: &FlightStatus,
         lease: &mut Lease,
     ) -> Verdict {
-        let frame = Source { seat, heard: now, arm: input.arm };
-        let before = self.others.iter().flatten().find(|other| other.seat == seat).map(|other| other.arm);
-        let rival = self.source.filter(|source| source.seat != seat && now.since(source.heard) < SILENCE);
+        let frame = Source { requester, heard: now, arm: input.arm };
+        let before = self.others.iter().flatten().find(|other| other.requester == requester).map(|other| other.arm);
+        let rival = self.source.filter(|source| source.requester != requester && now.since(source.heard) < SILENCE);
         let (rises, falls) = (before == Some(false) && input.arm, before == Some(true) && !input.arm);
         let refused = match (status.armed, rival) {
             (true, rival) => self.refusal_in_flight(&frame, status, rival, lease),
             // Its arm switch was seen off: one that is on when its frames begin must not arm.
-            (false, Some(rival)) if !rises || rival.arm => Some(rival.seat),
-            (false, _) => lease.holder(now).filter(|holder| *holder != seat),
+            (false, Some(rival)) if !rises || rival.arm => Some(rival.requester),
+            (false, _) => lease.holder(now).filter(|holder| *holder != requester),
         };
         if let Some(holder) = refused {
             self.put_aside(frame);
             return if falls && status.armed { Verdict::Lands(holder) } else { Verdict::Refused(holder) };
         }
-        self.forget(seat);
+        self.forget(requester);
         self.source = Some(frame);
-        match seat {
+        match requester {
             // What it does is the mode machine's decision. It has the lease as long as a hand holds the sticks, and a
             // program may lead again when it has let go.
-            Seat::Transmitter if status.armed => {
+            Requester::Transmitter if status.armed => {
                 let is_held =
                     [input.roll, input.pitch, input.yaw, input.throttle].iter().any(|stick| stick.abs() > HELD);
                 let flies = status.commander == CommandSource::Pilot;
                 if flies && (is_held || status.mode.is_manual() || lease.commander().is_none()) {
-                    lease.take(now, seat);
+                    lease.take(now, requester);
                 }
                 if flies { Verdict::Flies } else { Verdict::Passes }
             }
-            _ if status.armed && lease.taker() == Some(seat) => Verdict::Flies,
+            _ if status.armed && lease.taker() == Some(requester) => Verdict::Flies,
             _ => Verdict::Passes,
         }
     }
@@ -107,30 +107,30 @@ impl StickSource {
         status: &FlightStatus,
         rival: Option<Source>,
         lease: &mut Lease,
-    ) -> Option<Seat> {
-        let Source { seat, heard: now, arm } = *frame;
+    ) -> Option<Requester> {
+        let Source { requester, heard: now, arm } = *frame;
         match lease.taker() {
-            Some(holder) if holder != seat => {
+            Some(holder) if holder != requester => {
                 // While another's sticks fly, or have flown it last, the transmitter's would keep its flight going.
-                let is_source = self.source.is_some_and(|source| source.seat == seat);
+                let is_source = self.source.is_some_and(|source| source.requester == requester);
                 let is_heard = is_source || (status.commander != CommandSource::Pilot && rival.is_none());
-                (seat != Seat::Transmitter || !is_heard).then_some(holder)
+                (requester != Requester::Transmitter || !is_heard).then_some(holder)
             }
-            None if rival.is_some() => rival.map(|rival| rival.seat),
-            _ if seat == Seat::Transmitter => None,
+            None if rival.is_some() => rival.map(|rival| rival.requester),
+            _ if requester == Requester::Transmitter => None,
             // A program has armed it, and is about to command. Sticks that rest with the arm switch off take no lease.
             None if !arm => None,
-            _ => match lease.steer(now, seat) {
+            _ => match lease.steer(now, requester) {
                 Err(Refusal::Occupied(holder)) => Some(holder),
                 _ => None,
             },
         }
     }
 
-    /// Notes a frame that is not passed on, in the place of the seat's last one, a free place, or the oldest frame's.
+    /// Notes a frame that is not passed on, in the place of the requester's last one, a free place, or the oldest frame's.
     fn put_aside(&mut self, frame: Source) {
         let heard = |other: &Option<Source>| match other {
-            Some(other) if other.seat == frame.seat => None,
+            Some(other) if other.requester == frame.requester => None,
             other => Some(other.map(|other| other.heard)),
         };
         // `None` is less than any instant.
@@ -139,9 +139,9 @@ impl StickSource {
         }
     }
 
-    fn forget(&mut self, seat: Seat) {
+    fn forget(&mut self, requester: Requester) {
         for other in &mut self.others {
-            other.take_if(|other| other.seat == seat);
+            other.take_if(|other| other.requester == requester);
         }
     }
 }

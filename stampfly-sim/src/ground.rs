@@ -1,7 +1,7 @@
 //! Services at the ports of a simulated vehicle: MAVLink, MSP and the ground station's page
 //! (feature `ground`).
 //!
-//! A vehicle implements [`Hands`], describes itself in an [`About`], and lists in its
+//! A vehicle implements [`VehicleActions`], describes itself in an [`About`], and lists in its
 //! [`PORTS`](crate::vehicle::Vehicle::PORTS) which of [`PortSpec::PAGE`],
 //! [`PortSpec::MAVLINK_UDP`], [`PortSpec::MAVLINK_TCP`], [`PortSpec::MSP`] and
 //! [`PortSpec::MSP_SERIAL`] it opens; the port's constant determines its protocol. It then passes a
@@ -12,7 +12,7 @@
 //! use core::cell::RefCell;
 //! use stampfly_flight::newest::{NewestSamples, longest_message};
 //! use stampfly_param::{Parameters, RequestedParameters};
-//! use stampfly_services::{Hands, Refusal, Request};
+//! use stampfly_services::{VehicleActions, Refusal, Request};
 //! use stampfly_services::link::mavlink::dialects::common::MavType;
 //! use stampfly_sim::fault::Injector;
 //! use stampfly_sim::ground::{About, Served};
@@ -47,7 +47,7 @@
 //! /// A buoy with a lamp: it has parameters and accepts no commands.
 //! struct Buoy(RequestedParameters<Numbers, 8>);
 //!
-//! impl Hands for Buoy {
+//! impl VehicleActions for Buoy {
 //!     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
 //!     fn sticks(&mut self, _: Instant, _: &PilotInput) -> Result<(), Refusal> { Err(Refusal::Unsupported) }
 //!     fn parameters(&mut self) -> &mut dyn Parameters { &mut self.0 }
@@ -91,12 +91,15 @@ use core::cell::RefCell;
 use core::net::IpAddr;
 use stampfly_bus::TopicInfo;
 use stampfly_param::parameters;
-use stampfly_services::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
+use stampfly_services::goal::{CommandGoal, OVERTAKEN, TOO_MANY, Waited};
 use stampfly_services::link::mavlink::dialects::common::MavType;
 use stampfly_services::link::mavlink::signing::SigningKey;
 use stampfly_services::mavlink::{Identity, Mavlink};
 use stampfly_services::msp::{Card, Msp};
-use stampfly_services::{Cockpit as _, Hands, Helm, Places, Refusal, Request, Samples, Seat, Seated, View};
+use stampfly_services::{
+    ArbitratedAccess, CommandArbiter, Places, Refusal, Request, Requester, Samples, VehicleAccess as _, VehicleActions,
+    View,
+};
 use stampfly_types::messages::{FlightStatus, GuidedCommand};
 use stampfly_types::{Duration, Instant};
 use std::sync::Arc;
@@ -140,7 +143,7 @@ pub struct Ground<H> {
     identity: Identity,
     mavlink: Mavlink<Client, CLIENTS>,
     msp: Vec<(Client, Msp)>,
-    helm: Helm,
+    arbiter: CommandArbiter,
     places: Places,
     /// Open ports; tells which of them are local.
     ports: Arc<dyn Ports>,
@@ -149,20 +152,20 @@ pub struct Ground<H> {
     /// Number of the last event reported to pages.
     told: u32,
     /// The commander last reported to pages.
-    commander: Option<Option<Seat>>,
+    commander: Option<Option<Requester>>,
     /// Page requests not yet confirmed.
     waits: Vec<(Client, Asked, Waited)>,
     /// Actions of the vehicle for the services.
-    pub hands: H,
+    pub actions: H,
 }
 
 /// Handler of console lines from the page.
 pub type Console<'c, H> = &'c mut dyn FnMut(&mut H, &str) -> Result<Reply, String>;
 
-impl<H: Hands> Ground<H> {
+impl<H: VehicleActions> Ground<H> {
     /// Services of a vehicle with these hands. `faults` are those that a page can inject.
     #[must_use]
-    pub fn new(about: &About, live: &Live, faults: &Injector, hands: H) -> Self {
+    pub fn new(about: &About, live: &Live, faults: &Injector, actions: H) -> Self {
         let identity = Identity {
             system: u8::try_from(live.number + 1).unwrap_or(u8::MAX),
             kind: about.kind,
@@ -180,7 +183,7 @@ impl<H: Hands> Ground<H> {
                 None => Mavlink::for_clients(identity),
             },
             msp: Vec::new(),
-            helm: Helm::new(),
+            arbiter: CommandArbiter::new(),
             places: Places::of(about.topics),
             ports: live.ports.clone(),
             speed: live.speed.clone(),
@@ -188,7 +191,7 @@ impl<H: Hands> Ground<H> {
             told: 0,
             commander: None,
             waits: Vec::new(),
-            hands,
+            actions,
         }
     }
 
@@ -199,15 +202,15 @@ impl<H: Hands> Ground<H> {
     }
 
     /// Cockpit of the vehicle for one call of a service.
-    pub fn seated<'s>(&'s mut self, samples: &'s dyn Samples) -> Seated<'s> {
-        let Self { helm, places, hands, .. } = self;
-        Seated { helm, hands, view: View::new(samples, places) }
+    pub fn seated<'s>(&'s mut self, samples: &'s dyn Samples) -> ArbitratedAccess<'s> {
+        let Self { arbiter, places, actions, .. } = self;
+        ArbitratedAccess { arbiter, actions, view: View::new(samples, places) }
     }
 
     /// Command authority and hands: for a radio of the vehicle's own, which checks authority
     /// itself.
-    pub const fn helm(&mut self) -> (&mut Helm, &mut H) {
-        (&mut self.helm, &mut self.hands)
+    pub const fn arbiter(&mut self) -> (&mut CommandArbiter, &mut H) {
+        (&mut self.arbiter, &mut self.actions)
     }
 
     /// Handles an event at one of the common ports; events at other ports are ignored.
@@ -226,16 +229,16 @@ impl<H: Hands> Ground<H> {
                 // The server has already answered what it could not parse.
                 let asked = core::str::from_utf8(text).ok().and_then(|text| Asked::parse(text).ok());
                 let Some(asked) = asked else { return };
-                let deed = match &asked.ask {
-                    Ask::Guided(guided) => Deed::of(GuidedCommand::from(*guided).kind),
+                let goal = match &asked.ask {
+                    Ask::Guided(guided) => CommandGoal::of(GuidedCommand::from(*guided).kind),
                     _ => None,
                 };
                 let is_full = self.waits.len() >= WAITS;
-                if is_full && deed.is_some_and(|deed| !deed.ends_a_flight()) {
+                if is_full && goal.is_some_and(|goal| !goal.ends_a_flight()) {
                     return put(&from, asked.answered(Err(TOO_MANY.into())).as_bytes());
                 }
                 // Before the request is passed on, because the vehicle's refusals count from here.
-                let waited = deed.map(|deed| Waited::new(now, deed, &self.seated(samples)));
+                let waited = goal.map(|goal| Waited::new(now, goal, &self.seated(samples)));
                 let answer = self.page(now, page(&from), &asked.ask, samples, console);
                 match waited {
                     // Answered when the vehicle has visibly carried it out.
@@ -253,20 +256,20 @@ impl<H: Hands> Ground<H> {
             }
             (PortSpec::PAGE, Heard::Closed) => {
                 let gone = page(&from);
-                self.seated(samples).leave(&|seat| seat == gone);
+                self.seated(samples).leave(&|requester| requester == gone);
             }
             (PortSpec::MAVLINK_UDP | PortSpec::MAVLINK_TCP, heard) => self.mavlink(now, from, heard, samples, put),
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Opened) => {
                 self.msp.extend(self.about.card.map(|card| (from, Msp::new(card))));
             }
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Bytes(bytes) | Heard::Late(bytes)) => {
-                let Self { helm, places, hands, msp, .. } = self;
-                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+                let Self { arbiter, places, actions, msp, .. } = self;
+                let mut access = ArbitratedAccess { arbiter, actions, view: View::new(samples, places) };
                 let Some((_, msp)) = msp.iter_mut().find(|(client, _)| *client == from) else { return };
                 let answer = &mut |frame: &[u8]| put(&from, frame);
                 match heard {
-                    Heard::Late(_) => msp.hear_late(now, bytes, &mut cockpit, answer),
-                    _ => msp.hear(now, bytes, &mut cockpit, answer),
+                    Heard::Late(_) => msp.hear_late(now, bytes, &mut access, answer),
+                    _ => msp.hear(now, bytes, &mut access, answer),
                 }
             }
             (PortSpec::MSP | PortSpec::MSP_SERIAL, Heard::Closed) => self.msp.retain(|(client, _)| *client != from),
@@ -275,27 +278,27 @@ impl<H: Hands> Ground<H> {
     }
 
     fn mavlink(&mut self, now: Instant, from: Client, heard: Heard<'_>, samples: &dyn Samples, put: Put<'_>) {
-        let Self { helm, places, hands, mavlink, ports, .. } = self;
+        let Self { arbiter, places, actions, mavlink, ports, .. } = self;
         let is_local = ports.is_local(from.port);
         match heard {
             Heard::Opened if is_local => mavlink.open_local(now, from, true),
             Heard::Opened => mavlink.open(now, from, true),
             Heard::Bytes(bytes) => {
-                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
+                let mut access = ArbitratedAccess { arbiter, actions, view: View::new(samples, places) };
                 if is_local {
-                    return mavlink.hear_local(now, from, bytes, &mut cockpit, put);
+                    return mavlink.hear_local(now, from, bytes, &mut access, put);
                 }
-                mavlink.hear(now, from, bytes, &mut cockpit, put);
+                mavlink.hear(now, from, bytes, &mut access, put);
                 if mavlink.is_believed(from) {
                     ports.believe(&from);
                 }
             }
             Heard::Late(bytes) => {
-                let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
-                mavlink.hear_late(now, from, is_local, bytes, &mut cockpit, put);
+                let mut access = ArbitratedAccess { arbiter, actions, view: View::new(samples, places) };
+                mavlink.hear_late(now, from, is_local, bytes, &mut access, put);
             }
             Heard::Closed => {
-                mavlink.close(from, &mut Seated { helm, hands, view: View::new(samples, places) });
+                mavlink.close(from, &mut ArbitratedAccess { arbiter, actions, view: View::new(samples, places) });
             }
         }
     }
@@ -304,36 +307,36 @@ impl<H: Hands> Ground<H> {
     fn page(
         &mut self,
         now: Instant,
-        seat: Seat,
+        requester: Requester,
         ask: &Ask,
         samples: &dyn Samples,
         console: Console<'_, H>,
     ) -> Result<Reply, String> {
-        let mut cockpit = self.seated(samples);
-        cockpit.alive(now, seat);
+        let mut access = self.seated(samples);
+        access.alive(now, requester);
         let said = |result: Result<(), Refusal>| match result {
             Ok(()) => Ok(Reply::text("")),
             Err(refusal) => Err(refusal.to_string()),
         };
         match ask {
-            Ask::Guided(guided) if let Some(why) = refusal(*guided, &cockpit.view().state()) => Err(why),
+            Ask::Guided(guided) if let Some(why) = refusal(*guided, &access.view().state()) => Err(why),
             // A click on the map replaces the waiting waypoints, so that it takes effect
             // immediately.
-            Ask::Guided(go_to @ Guided::GoTo { .. }) => said(cockpit.fly_to(now, seat, (*go_to).into())),
-            Ask::Guided(guided) => said(cockpit.guide(now, seat, (*guided).into())),
-            Ask::Sticks(sticks) => said(cockpit.steer(now, seat, &(*sticks).into())),
+            Ask::Guided(go_to @ Guided::GoTo { .. }) => said(access.fly_to(now, requester, (*go_to).into())),
+            Ask::Guided(guided) => said(access.guide(now, requester, (*guided).into())),
+            Ask::Sticks(sticks) => said(access.steer(now, requester, &(*sticks).into())),
             Ask::MotorTest { motor, duty } => {
-                said(cockpit.request(now, Request::TestMotor { motor: *motor, duty: *duty }))
+                said(access.request(now, Request::TestMotor { motor: *motor, duty: *duty }))
             }
-            Ask::MotorStop {} => said(cockpit.request(now, Request::StopMotor)),
+            Ask::MotorStop {} => said(access.request(now, Request::StopMotor)),
             Ask::ParamGet { name } => {
-                let config = cockpit.parameters();
+                let config = access.parameters();
                 let value = parameters::find(config, name).ok().and_then(|index| config.get(index));
                 value.map(|value| Reply::value(value.into())).ok_or_else(|| "there is no such parameter".into())
             }
             Ask::ParamSet { name, value } => {
-                let armed = cockpit.view().state().armed;
-                let config = cockpit.parameters();
+                let armed = access.view().state().armed;
+                let config = access.parameters();
                 let info = parameters::find(config, name).ok().and_then(|index| config.describe(index));
                 // Some parameters may only change on the ground.
                 if armed && info.is_some_and(|info| !info.in_flight) {
@@ -344,8 +347,8 @@ impl<H: Hands> Ground<H> {
                     Err(error) => Err(error.to_string()),
                 }
             }
-            Ask::ParamSave {} => said(cockpit.request(now, Request::SaveParameters)),
-            Ask::Console { line } => console(&mut self.hands, line),
+            Ask::ParamSave {} => said(access.request(now, Request::SaveParameters)),
+            Ask::Console { line } => console(&mut self.actions, line),
             Ask::Fault { text } => self.break_something(now, text),
             Ask::FaultClear {} => {
                 (0..self.faults.faults().count()).for_each(|place| self.faults.end(place, now));
@@ -375,19 +378,19 @@ impl<H: Hands> Ground<H> {
     /// Call it at every tick, before [`answer`](Self::answer): updates the command authority.
     pub fn poll(&mut self, now: Instant, samples: &dyn Samples) {
         let armed = View::new(samples, &self.places).state().armed;
-        self.helm.poll(now, armed, &mut self.hands);
+        self.arbiter.poll(now, armed, &mut self.actions);
     }
 
     /// Sends due data. Call it every [`TURN`] ticks.
     pub fn answer(&mut self, now: Instant, samples: &dyn Samples, put: Put<'_>) {
-        let holder = self.helm.holder(now);
+        let holder = self.arbiter.holder(now);
         if self.commander.replace(holder) != Some(holder) {
-            let page = if let Some(Seat::Page(number)) = holder { Some(number) } else { None };
-            self.ports.tell_commander(&holder.map(|seat| seat.to_string()).unwrap_or_default(), page);
+            let page = if let Some(Requester::Page(number)) = holder { Some(number) } else { None };
+            self.ports.tell_commander(&holder.map(|requester| requester.to_string()).unwrap_or_default(), page);
         }
-        let Self { helm, places, hands, mavlink, ports, told, waits, .. } = self;
-        let mut cockpit = Seated { helm, hands, view: View::new(samples, places) };
-        waits.retain(|(client, asked, waited)| match waited.look(now, &cockpit) {
+        let Self { arbiter, places, actions, mavlink, ports, told, waits, .. } = self;
+        let mut access = ArbitratedAccess { arbiter, actions, view: View::new(samples, places) };
+        waits.retain(|(client, asked, waited)| match waited.look(now, &access) {
             None => true,
             Some(result) => {
                 let answer = result.map(|()| Reply::text("done")).map_err(|why| format!("refused: {why}"));
@@ -395,29 +398,29 @@ impl<H: Hands> Ground<H> {
                 false
             }
         });
-        while let Some((number, what)) = cockpit.told(*told) {
+        while let Some((number, what)) = access.told(*told) {
             *told = number;
             ports.tell(&what.to_string());
         }
-        mavlink.poll(now, &mut cockpit, put);
+        mavlink.poll(now, &mut access, put);
     }
 }
 
 /// Why a vehicle in this state would refuse the command, as far as known beforehand.
 fn refusal(guided: Guided, status: &FlightStatus) -> Option<String> {
     let mut words = String::new();
-    let deed = Deed::of(GuidedCommand::from(guided).kind)?;
-    deed.refuse(status, &mut words).then_some(words)
+    let goal = CommandGoal::of(GuidedCommand::from(guided).kind)?;
+    goal.refuse(status, &mut words).then_some(words)
 }
 
-/// The seat of the page with this client's number.
-fn page(client: &Client) -> Seat {
+/// The requester of the page with this client's number.
+fn page(client: &Client) -> Requester {
     // The server encodes the page's number in the address.
     let number = match client.address.ip() {
         IpAddr::V6(number) => number.to_bits() as u32,
         IpAddr::V4(number) => number.to_bits(),
     };
-    Seat::Page(number)
+    Requester::Page(number)
 }
 
 /// The [`Link`] of a vehicle that has only the common services: pass it to [`Live::serve`] with
@@ -427,15 +430,15 @@ pub struct Served<'n, H, S> {
     newest: &'n RefCell<S>,
 }
 
-impl<'n, H: Hands, S: Samples> Served<'n, H, S> {
+impl<'n, H: VehicleActions, S: Samples> Served<'n, H, S> {
     /// As [`Ground::new`]; the vehicle's newest samples are read from `newest`.
     #[must_use]
-    pub fn new(about: &About, live: &Live, faults: &Injector, hands: H, newest: &'n RefCell<S>) -> Self {
-        Self { ground: Ground::new(about, live, faults, hands), newest }
+    pub fn new(about: &About, live: &Live, faults: &Injector, actions: H, newest: &'n RefCell<S>) -> Self {
+        Self { ground: Ground::new(about, live, faults, actions), newest }
     }
 }
 
-impl<H: Hands, S: Samples> Link for Served<'_, H, S> {
+impl<H: VehicleActions, S: Samples> Link for Served<'_, H, S> {
     fn hear(&mut self, now: Instant, from: Client, heard: Heard<'_>, put: Put<'_>) {
         let console: Console<'_, H> = &mut |_, _| Err("this vehicle has no console".into());
         self.ground.hear(now, from, heard, &*self.newest.borrow(), console, put);

@@ -16,7 +16,9 @@ use core::cell::{Cell, RefCell};
 use core::str::FromStr;
 use stampfly_bus::TopicInfo;
 use stampfly_services::mission::{Runner, Step};
-use stampfly_services::{Cockpit, Hands, Helm, Places, Samples, Seat, Seated, View};
+use stampfly_services::{
+    ArbitratedAccess, CommandArbiter, Places, Requester, Samples, VehicleAccess, VehicleActions, View,
+};
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use stampfly_types::{Duration, Instant, Origin, Vec3};
 
@@ -118,19 +120,32 @@ impl Mission {
 /// The ground station at the other end of a vehicle's link.
 pub struct Station<'a, H, S> {
     clock: Clock,
-    helm: Helm,
-    hands: H,
+    arbiter: CommandArbiter,
+    actions: H,
     places: Places,
     newest: &'a RefCell<S>,
     /// While true, the link is interrupted in both directions.
     silent: &'a Cell<bool>,
 }
 
-impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
-    /// A station for a vehicle with these `hands` and `topics`. It reads samples from `newest`.
+impl<'a, H: VehicleActions, S: Samples> Station<'a, H, S> {
+    /// A station for a vehicle with these `actions` and `topics`. It reads samples from `newest`.
     #[must_use]
-    pub fn new(clock: &Clock, hands: H, topics: &[TopicInfo], newest: &'a RefCell<S>, silent: &'a Cell<bool>) -> Self {
-        Self { clock: clock.clone(), helm: Helm::new(), hands, places: Places::of(topics), newest, silent }
+    pub fn new(
+        clock: &Clock,
+        actions: H,
+        topics: &[TopicInfo],
+        newest: &'a RefCell<S>,
+        silent: &'a Cell<bool>,
+    ) -> Self {
+        Self {
+            clock: clock.clone(),
+            arbiter: CommandArbiter::new(),
+            actions,
+            places: Places::of(topics),
+            newest,
+            silent,
+        }
     }
 
     /// Flies the mission. A vehicle without a take-off height of its own climbs to `height`, m; a
@@ -138,35 +153,35 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
     pub async fn fly(mut self, Mission(flights): &Mission, [height, reach]: [f32; 2], progress: &Progress) {
         for flight in flights {
             self.wait_until_ready().await;
-            let Some(origin) = self.seat(|cockpit, _| cockpit.origin()) else { return };
+            let Some(origin) = self.requester(|access, _| access.origin()) else { return };
             // Positions are relative to the origin, which is known only when the vehicle is ready.
             let steps = Mission::steps(flight, &origin, height);
             let mut runner = Runner::new(height, reach);
-            let armed = |cockpit: &mut dyn Cockpit| cockpit.view().state().armed;
-            while !self.seat(|cockpit, _| armed(cockpit)) {
-                self.seat(|cockpit, now| {
+            let armed = |access: &mut dyn VehicleAccess| access.view().state().armed;
+            while !self.requester(|access, _| armed(access)) {
+                self.requester(|access, now| {
                     // The request is refused while the queue is full; the loop repeats it.
-                    let _ = cockpit.guide(
+                    let _ = access.guide(
                         now,
-                        Seat::Console,
+                        Requester::Console,
                         GuidedCommand { kind: GuidedKind::Arm, ..Default::default() },
                     );
                 });
                 self.turn().await;
             }
-            self.seat(|cockpit, now| {
-                let _ = runner.start(now, Seat::Console, cockpit);
+            self.requester(|access, now| {
+                let _ = runner.start(now, Requester::Console, access);
             });
             let before = progress.legs.get();
             // The loop ends on disarming: a mission that a failsafe has taken over is not resumed.
-            while !runner.is_finished() && self.seat(|cockpit, _| armed(cockpit)) {
+            while !runner.is_finished() && self.requester(|access, _| armed(access)) {
                 let current = if self.silent.get() {
                     runner.current()
                 } else {
-                    self.seat(|cockpit, now| {
-                        cockpit.alive(now, Seat::Console);
-                        runner.alive(now, Seat::Console);
-                        runner.poll(now, cockpit, &|place| steps.get(place).copied());
+                    self.requester(|access, now| {
+                        access.alive(now, Requester::Console);
+                        runner.alive(now, Requester::Console);
+                        runner.poll(now, access, &|place| steps.get(place).copied());
                         runner.current()
                     })
                 };
@@ -186,9 +201,9 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
         // Restarts whenever the vehicle becomes unready, so the time counts from the last change.
         let mut since = self.clock.now();
         loop {
-            let is_ready = self.seat(|cockpit, _| {
-                let state = cockpit.view().state();
-                cockpit.origin().is_some() && state.blocks.is_empty() && !state.armed
+            let is_ready = self.requester(|access, _| {
+                let state = access.view().state();
+                access.origin().is_some() && state.blocks.is_empty() && !state.armed
             });
             let now = self.clock.now();
             if !is_ready {
@@ -203,16 +218,16 @@ impl<'a, H: Hands, S: Samples> Station<'a, H, S> {
     async fn turn(&mut self) {
         let now = self.clock.now();
         if !self.silent.get() {
-            let armed = self.seat(|cockpit, _| cockpit.view().state().armed);
-            self.helm.poll(now, armed, &mut self.hands);
+            let armed = self.requester(|access, _| access.view().state().armed);
+            self.arbiter.poll(now, armed, &mut self.actions);
         }
         self.clock.sleep_until(now + TURN).await;
     }
 
     /// Gives `call` access to the vehicle.
-    fn seat<T>(&mut self, call: impl FnOnce(&mut dyn Cockpit, Instant) -> T) -> T {
+    fn requester<T>(&mut self, call: impl FnOnce(&mut dyn VehicleAccess, Instant) -> T) -> T {
         let newest = self.newest.borrow();
         let view = View::new(&*newest, &self.places);
-        call(&mut Seated { helm: &mut self.helm, hands: &mut self.hands, view }, self.clock.now())
+        call(&mut ArbitratedAccess { arbiter: &mut self.arbiter, actions: &mut self.actions, view }, self.clock.now())
     }
 }

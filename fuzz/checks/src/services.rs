@@ -171,7 +171,7 @@ pub fn services_mavlink(data: &[u8]) {
 }
 
 fn vehicle_is_armed(vehicle: &Vehicle) -> bool {
-    use stampfly_services::Cockpit as _;
+    use stampfly_services::VehicleAccess as _;
     vehicle.view().state().armed
 }
 

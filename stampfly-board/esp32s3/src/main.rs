@@ -21,7 +21,7 @@ mod cutoff;
 mod facts;
 mod flash;
 mod flight;
-mod hands;
+mod actions;
 #[cfg(feature = "hil")]
 mod hil;
 mod i2c;
@@ -63,7 +63,7 @@ use stampfly_flight::{Assembled, FlightLoop, InPlace};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, Policy};
 use stampfly_services::cable::fingerprint;
-use stampfly_services::{Helm, RadioDesk};
+use stampfly_services::{CommandArbiter, RadioRequests};
 use static_cell::StaticCell;
 use storage::Storage;
 
@@ -197,17 +197,17 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             button: outside.button_pin,
         });
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
-        static DESK: StaticCell<RefCell<RadioDesk>> = StaticCell::new();
+        static DESK: StaticCell<RefCell<RadioRequests>> = StaticCell::new();
         let tables = fingerprint(&topics::TOPICS, &config);
-        let desk: &'static _ = DESK.init_with(|| RefCell::new(RadioDesk::new(tables)));
-        static HELM: StaticCell<RefCell<Helm>> = StaticCell::new();
-        let helm: &'static _ = HELM.init_with(|| RefCell::new(Helm::new()));
+        let requests: &'static _ = DESK.init_with(|| RefCell::new(RadioRequests::new(tables)));
+        static ARBITER: StaticCell<RefCell<CommandArbiter>> = StaticCell::new();
+        let arbiter: &'static _ = ARBITER.init_with(|| RefCell::new(CommandArbiter::new()));
         let link = radio::link(peer, key.clone(), policy, outside.link);
         let radio = Box::new(radio::Parts {
             unit: chip.WIFI,
             link,
-            helm,
-            desk,
+            arbiter,
+            requests,
             taken,
             memory,
             #[cfg(feature = "wifi")]
@@ -225,8 +225,8 @@ fn start(chip: Peripherals, tested: Outcome) -> ! {
             facts: facts::Facts::read(unusable),
             key,
             link,
-            helm,
-            desk,
+            arbiter,
+            requests,
             taken,
             #[cfg(feature = "wifi")]
             network: (network, reserved),

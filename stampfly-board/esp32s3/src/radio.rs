@@ -34,10 +34,10 @@ use stampfly_board::topics;
 use stampfly_drivers::Timebase;
 use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
-use stampfly_services::Helm;
-use stampfly_services::desk::Post;
-use stampfly_services::radio_desk::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioDesk, Words};
-use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
+use stampfly_services::CommandArbiter;
+use stampfly_services::requests::QueuedPayload;
+use stampfly_services::radio_requests::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioRequests, Words};
+use stampfly_services::subscription::{RADIO_CHUNK, RADIO_CHUNKS};
 use static_cell::StaticCell;
 
 /// A key that was made and is to be stored.
@@ -48,9 +48,9 @@ pub struct Parts {
     pub unit: WIFI<'static>,
     pub link: &'static RefCell<Link<'static>>,
     /// Who commands, by radio and at the console's services alike.
-    pub helm: &'static RefCell<Helm>,
+    pub arbiter: &'static RefCell<CommandArbiter>,
     /// What a station with the key asks besides flying.
-    pub desk: &'static RefCell<RadioDesk>,
+    pub requests: &'static RefCell<RadioRequests>,
     /// The flight record.
     pub taken: &'static RefCell<Taken>,
     /// The newest samples, and whether the vehicle is armed.
@@ -61,7 +61,7 @@ pub struct Parts {
 }
 
 /// Answers of the desk, which the console's task makes: sealed right before they are sent, so that no frame overtakes another.
-pub static POST: Channel<CriticalSectionRawMutex, Post, POST_AT_ONCE> = Channel::new();
+pub static POST: Channel<CriticalSectionRawMutex, QueuedPayload, POST_AT_ONCE> = Channel::new();
 const POST_AT_ONCE: usize = 2;
 
 /// A link of a vehicle with this transmitter and key, as far as it has them.
@@ -84,8 +84,8 @@ pub async fn run(parts: Box<Parts>) {
     let Parts {
         unit,
         link,
-        helm,
-        desk,
+        arbiter,
+        requests,
         taken,
         memory,
         #[cfg(feature = "wifi")]
@@ -104,7 +104,7 @@ pub async fn run(parts: Box<Parts>) {
     {
         link.borrow_mut().guarded.set_vehicle(Vehicle::new(key));
     }
-    let waiting = Waiting { helm, taken, desk, memory };
+    let waiting = Waiting { arbiter, taken, requests, memory };
     #[cfg(feature = "wifi")]
     {
         let mut seed = [0; 8];
@@ -112,11 +112,11 @@ pub async fn run(parts: Box<Parts>) {
         let air = wifi::start(network, u64::from_le_bytes(seed));
         let say = Say { sender, manager: &manager, network };
         let in_the_network =
-            join(wifi::carry(air, network, (link, helm), desk), wifi::associate(controller, &manager, network, memory));
-        join3(receive(receiver, link, helm, desk), send(say, &random, link, waiting), in_the_network).await;
+            join(wifi::carry(air, network, (link, arbiter), requests), wifi::associate(controller, &manager, network, memory));
+        join3(receive(receiver, link, arbiter, requests), send(say, &random, link, waiting), in_the_network).await;
     }
     #[cfg(not(feature = "wifi"))]
-    join(receive(receiver, link, helm, desk), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
+    join(receive(receiver, link, arbiter, requests), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
 }
 
 /// A new key, which is also handed on to be stored.
@@ -131,8 +131,8 @@ fn make(random: &Trng) -> Option<Key> {
 async fn receive(
     mut receiver: EspNowReceiver,
     link: &RefCell<Link<'_>>,
-    helm: &RefCell<Helm>,
-    desk: &RefCell<RadioDesk>,
+    arbiter: &RefCell<CommandArbiter>,
+    requests: &RefCell<RadioRequests>,
 ) {
     let mut room = [0; MAX_FRAME];
     loop {
@@ -142,9 +142,9 @@ async fn receive(
         if let Some(frame) = room.get_mut(..received.data().len()) {
             frame.copy_from_slice(received.data());
             let now = Clock.now();
-            if let Ok(Some(received)) = link.borrow_mut().receive(&mut helm.borrow_mut(), now, source, frame) {
+            if let Ok(Some(received)) = link.borrow_mut().receive(&mut arbiter.borrow_mut(), now, source, frame) {
                 // A station asks again for what there is no room for.
-                let _ = desk.borrow_mut().ask(now, &received.payload);
+                let _ = requests.borrow_mut().ask(now, &received.payload);
             }
         }
     }
@@ -152,9 +152,9 @@ async fn receive(
 
 /// Where there may be something for a station that has asked for it.
 struct Waiting {
-    helm: &'static RefCell<Helm>,
+    arbiter: &'static RefCell<CommandArbiter>,
     taken: &'static RefCell<Taken>,
-    desk: &'static RefCell<RadioDesk>,
+    requests: &'static RefCell<RadioRequests>,
     memory: &'static RefCell<Memory>,
 }
 
@@ -164,8 +164,8 @@ impl Waiting {
     #[inline(never)]
     fn sample<'r>(&self, link: &RefCell<Link<'_>>, room: &'r mut [u8; MAX_FRAME]) -> Option<(Address, &'r [u8])> {
         let (now, mut words): (_, Words) = (Clock.now(), [[0; 4]; _]);
-        let (mut desk, memory) = (self.desk.borrow_mut(), self.memory.borrow());
-        let payload = desk.next(now, &memory.newest, &mut words)?;
+        let (mut requests, memory) = (self.requests.borrow_mut(), self.memory.borrow());
+        let payload = requests.next(now, &memory.newest, &mut words)?;
         link.borrow_mut().guarded.seal(now, &payload, room)
     }
 }
@@ -184,8 +184,8 @@ async fn send(mut say: Say<'_>, random: &Trng, link: &RefCell<Link<'_>>, waiting
                 let _ = say.say(to, bytes).await;
             }
         }
-        link.borrow_mut().keep(&mut waiting.helm.borrow_mut(), Clock.now());
-        let notice = link.borrow_mut().notice(&waiting.helm.borrow(), Clock.now(), &mut room);
+        link.borrow_mut().keep(&mut waiting.arbiter.borrow_mut(), Clock.now());
+        let notice = link.borrow_mut().notice(&waiting.arbiter.borrow(), Clock.now(), &mut room);
         if let Some((to, bytes)) = notice {
             let _ = say.say(to, bytes).await;
         }

@@ -7,7 +7,7 @@ use core::cell::RefCell;
 use stampfly_board::schedule::Runnables;
 use stampfly_board::topics::Id;
 use stampfly_flight::compact::{Compact, Kept, Ring, RingReader, RingWriter, Streamer};
-use stampfly_services::Tape;
+use stampfly_services::RecordSubscription;
 use stampfly_types::{Duration, Instant};
 use static_cell::ConstStaticCell;
 
@@ -45,7 +45,7 @@ pub enum Line {
 
 /// The other core's half: who has the record, and what comes out of the ring.
 pub struct Taken {
-    tape: Tape<Line>,
+    subscription: RecordSubscription<Line>,
     streamer: Streamer<'static, WORDS>,
 }
 
@@ -59,23 +59,23 @@ impl Taken {
     /// Nobody has it yet.
     pub fn new(mut reader: RingReader<'static, WORDS>) -> RefCell<Self> {
         reader.want(false);
-        RefCell::new(Self { tape: Tape::new(), streamer: Streamer::new(reader) })
+        RefCell::new(Self { subscription: RecordSubscription::new(), streamer: Streamer::new(reader) })
     }
 
     /// What a station has said of it, if it has.
     pub fn ask(&mut self, now: Instant, line: Line, wanted: Option<bool>) {
         if let Some(wanted) = wanted.filter(|_| IS_THERE) {
-            self.tape.ask(now, line, wanted);
+            self.subscription.ask(now, line, wanted);
         }
     }
 
     /// Tells the flight core whether somebody wants it.
     pub fn poll(&mut self, now: Instant) {
-        self.tape.poll(now, &mut self.streamer);
+        self.subscription.poll(now, &mut self.streamer);
     }
 
     /// The next chunk for a station there, of at least so many bytes.
     pub fn chunk<'r>(&mut self, line: Line, room: &'r mut [u8], least: usize) -> Option<&'r [u8]> {
-        self.tape.chunk(line, &mut self.streamer, room, least)
+        self.subscription.chunk(line, &mut self.streamer, room, least)
     }
 }

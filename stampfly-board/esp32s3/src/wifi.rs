@@ -25,7 +25,7 @@ use stampfly_link::Address;
 use stampfly_link::secure::MAX_FRAME;
 use stampfly_services::association::{Association, Credentials, Event, State, Step};
 use stampfly_services::network::{self, Door, Routes, Stack};
-use stampfly_services::{Helm, RadioDesk};
+use stampfly_services::{CommandArbiter, RadioRequests};
 use stampfly_types::Instant;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -169,8 +169,8 @@ impl Device for Air {
 /// The radio's link and desk, as the network sees them.
 struct Behind {
     link: &'static RefCell<Link<'static>>,
-    helm: &'static RefCell<Helm>,
-    desk: &'static RefCell<RadioDesk>,
+    arbiter: &'static RefCell<CommandArbiter>,
+    requests: &'static RefCell<RadioRequests>,
 }
 
 impl Door for Behind {
@@ -179,10 +179,10 @@ impl Door for Behind {
     }
 
     fn take(&mut self, now: Instant, source: Address, frame: &mut [u8]) {
-        let (mut link, mut helm) = (self.link.borrow_mut(), self.helm.borrow_mut());
-        if let Ok(Some(received)) = link.receive_sealed(&mut helm, now, source, frame) {
+        let (mut link, mut arbiter) = (self.link.borrow_mut(), self.arbiter.borrow_mut());
+        if let Ok(Some(received)) = link.receive_sealed(&mut arbiter, now, source, frame) {
             // A station asks again for what there is no room for.
-            let _ = self.desk.borrow_mut().ask(now, &received.payload);
+            let _ = self.requests.borrow_mut().ask(now, &received.payload);
         }
     }
 
@@ -206,11 +206,11 @@ pub fn start(network: &RefCell<Network>, seed: u64) -> Air {
 pub async fn carry(
     mut air: Air,
     network: &RefCell<Network>,
-    (link, helm): (&'static RefCell<Link<'static>>, &'static RefCell<Helm>),
-    desk: &'static RefCell<RadioDesk>,
+    (link, arbiter): (&'static RefCell<Link<'static>>, &'static RefCell<CommandArbiter>),
+    requests: &'static RefCell<RadioRequests>,
 ) {
     let mut ticker = Ticker::every(TURN);
-    let mut door = Behind { link, helm, desk };
+    let mut door = Behind { link, arbiter, requests };
     loop {
         ticker.next().await;
         turn(&mut air, &mut network.borrow_mut(), &mut door);

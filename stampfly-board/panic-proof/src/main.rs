@@ -25,7 +25,7 @@ use stampfly_drivers::chip::{bmi270, bmm150, bmp280, ina3221, mpu6000, nrf24l01,
 use stampfly_flight::Assembled;
 use stampfly_link::secure::{Guarded, Key, MAX_FRAME, Payload, Policy, Station, Vehicle};
 use stampfly_link::{Address, PairingPacket, Session, TelemetryPacket};
-use stampfly_services::Helm;
+use stampfly_services::CommandArbiter;
 use stampfly_types::Instant;
 
 unsafe extern "C" {
@@ -62,7 +62,7 @@ fn vehicle() {
     let session = Session::new(black_box(Address([0; 6])), black_box(1), black_box(None));
     let vehicle = Key::generate(black_box(1), black_box([0; 32])).ok().map(Vehicle::new);
     let mut link = Link::new(Guarded::new(vehicle, session, black_box(Policy::default())), outside.link);
-    let mut helm = Helm::new();
+    let mut arbiter = CommandArbiter::new();
     let mut room = [0; MAX_FRAME];
     let mut memory = BlackBox::<1024>::new(RETENTION);
     while black_box(true) {
@@ -83,12 +83,12 @@ fn vehicle() {
         let mut bytes = black_box([0; MAX_FRAME]);
         let Some(bytes) = bytes.get_mut(..black_box(0)) else { continue };
         let _ = black_box((PairingPacket::decode(bytes), TelemetryPacket::decode(bytes)));
-        let _ = black_box(link.receive(&mut helm, at, black_box(Address([0; 6])), bytes));
+        let _ = black_box(link.receive(&mut arbiter, at, black_box(Address([0; 6])), bytes));
         for what in Outgoing::ALL {
             black_box(link.transmit(at, what, black_box([0; 8]), &mut room));
         }
-        link.keep(&mut helm, at);
-        black_box(link.notice(&helm, at, &mut room));
+        link.keep(&mut arbiter, at);
+        black_box(link.notice(&arbiter, at, &mut room));
         black_box(link.guarded.session().age(at));
         flight_loop.run_band(Band::Flight, black_box(at), &mut ());
         flight_loop.run_band(Band::Background, black_box(at), &mut ());

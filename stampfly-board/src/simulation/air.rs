@@ -14,8 +14,8 @@ use stampfly_link::secure::{
     Guarded, Key, KeyError, MAX_BODY, MAX_FRAME, NotTaken, Payload, Policy, Refused, Station, Tally, Vehicle,
 };
 use stampfly_link::{Address, ControlPacket, Session};
-use stampfly_services::tape::{RADIO_CHUNK, RADIO_CHUNKS};
-use stampfly_services::{Desk, Helm, Tape};
+use stampfly_services::subscription::{RADIO_CHUNK, RADIO_CHUNKS};
+use stampfly_services::{CommandArbiter, RecordSubscription, StationRequests};
 use stampfly_sim::Noise;
 use stampfly_sim::time::Clock;
 use stampfly_types::messages::PilotInput;
@@ -79,7 +79,7 @@ pub struct AirReport {
 pub(super) struct Ends<'b> {
     link: Link<'b>,
     /// One station and a stranger: no program is at any port.
-    helm: Helm,
+    arbiter: CommandArbiter,
     station: Station,
     noise: Noise,
     /// The newest of the station's frames, which a stranger has recorded.
@@ -94,9 +94,9 @@ pub(super) struct Ends<'b> {
     /// Share of the frames that are lost.
     loss: f64,
     /// What the station asks for, as the firmware keeps it.
-    desk: Desk,
+    requests: StationRequests,
     /// Who has the flight record: the station, if it has asked.
-    tape: Tape<()>,
+    subscription: RecordSubscription<()>,
     /// When chunks are sent again, and when the station asks again.
     recording: [Instant; 2],
     record: Vec<u8>,
@@ -113,7 +113,7 @@ impl<'b> Ends<'b> {
         let policy = Policy { accept_unauthenticated: config.accept_unauthenticated };
         Ok(Self {
             link: Link::new(Guarded::new(Vehicle::new(key.clone()), session, policy), ends),
-            helm: Helm::new(),
+            arbiter: CommandArbiter::new(),
             station: Station::new(key),
             noise,
             recorded: Vec::new(),
@@ -123,8 +123,8 @@ impl<'b> Ends<'b> {
             frame: TelemetryFrame::default(),
             report: AirReport::default(),
             loss: f64::from(what.loss) / 1_000.0,
-            desk: Desk::new(),
-            tape: Tape::new(),
+            requests: StationRequests::new(),
+            subscription: RecordSubscription::new(),
             recording: [Instant::ZERO; 2],
             record: MAGIC.to_vec(),
         })
@@ -145,13 +145,13 @@ impl<'b> Ends<'b> {
         if now >= ask {
             self.say(now, &Payload::Record { wanted: true }, true);
         }
-        if let Some(wanted) = self.desk.record() {
-            self.tape.ask(now, (), wanted);
+        if let Some(wanted) = self.requests.record() {
+            self.subscription.ask(now, (), wanted);
         }
-        self.tape.poll(now, chunks);
+        self.subscription.poll(now, chunks);
         for _ in 0..RADIO_CHUNKS {
             let (mut body, mut room) = ([0; MAX_BODY], [0; MAX_FRAME]);
-            let Some(chunk) = self.tape.chunk((), chunks, &mut body, RADIO_CHUNK) else { break };
+            let Some(chunk) = self.subscription.chunk((), chunks, &mut body, RADIO_CHUNK) else { break };
             // Without a session it is gone, as on the air.
             let Some((_, frame)) = self.link.guarded.seal(now, &Payload::Chunk(chunk), &mut room) else { continue };
             let mut frame = frame.to_vec();
@@ -258,8 +258,8 @@ impl<'b> Ends<'b> {
         if self.tick.0 != tick {
             self.tick = (tick, self.tally().tag);
         }
-        let heard = self.link.receive(&mut self.helm, now, TRANSMITTER, bytes).map(|received| {
-            received.map(|received| self.desk.ask(0, &received.payload));
+        let heard = self.link.receive(&mut self.arbiter, now, TRANSMITTER, bytes).map(|received| {
+            received.map(|received| self.requests.ask(0, &received.payload));
         });
         self.report.worst_tags = self.report.worst_tags.max(self.tally().tag - self.tick.1);
         let is_opened = !matches!(heard, Err(error) if error != NotTaken::Secure(Refused::Tag));

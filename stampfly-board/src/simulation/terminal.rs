@@ -20,7 +20,7 @@ const PROMPT: &str = "> ";
 const CTRL_C: u8 = 3;
 
 /// What every command line of a vehicle shares.
-pub struct Desk<'d> {
+pub struct StationRequests<'d> {
     /// Version of the program.
     pub version: &'d str,
     pub newest: &'d Newest,
@@ -32,7 +32,7 @@ pub struct Desk<'d> {
     pub beside: Option<Rc<Handling>>,
 }
 
-impl Desk<'_> {
+impl StationRequests<'_> {
     /// The vehicle, as a console sees it, with this configuration of the next start.
     pub fn console<R>(&self, config: &mut VehicleConfig, ask: impl FnOnce(&mut Console<'_>) -> R) -> R {
         let errors: Vec<_> = self.health.iter().map(|health| health.last_error()).collect();
@@ -45,7 +45,7 @@ impl Desk<'_> {
                 last_error: error.as_ref().map(|error| error as &dyn Display),
             })
             .collect();
-        let Desk { version, newest, profile, facts, .. } = *self;
+        let StationRequests { version, newest, profile, facts, .. } = *self;
         ask(&mut Console { version, newest, sensors: &sensors, profile, facts, config })
     }
 }
@@ -75,17 +75,17 @@ impl Terminal {
         &mut self,
         now: Instant,
         keys: &[u8],
-        desk: &Desk<'_>,
+        requests: &StationRequests<'_>,
         (config, ends): (&mut VehicleConfig, &mut ConsoleEnds<'_>),
         board: impl Fn(&Request<Command>, &VehicleConfig) -> &'static str,
     ) {
         for key in keys {
             let Some(line) = self.editor.feed(*key, &mut self.screen).map(String::from) else { continue };
-            if let (Some(asked), Some(beside)) = (line.trim().strip_prefix("world"), &desk.beside) {
+            if let (Some(asked), Some(beside)) = (line.trim().strip_prefix("world"), &requests.beside) {
                 _ = write!(self.screen, "{}\r\n{PROMPT}", beside.obey(now, asked));
                 continue;
             }
-            match self.obey(now, &line, desk, config) {
+            match self.obey(now, &line, requests, config) {
                 Request::Nothing => {}
                 Request::Vehicle(command) => {
                     command.publish(now, ends);
@@ -121,8 +121,14 @@ impl Terminal {
         }
     }
 
-    fn obey(&mut self, now: Instant, line: &str, desk: &Desk<'_>, config: &mut VehicleConfig) -> Request<Command> {
-        desk.console(config, |vehicle| answer(line, now, vehicle, &mut self.screen).unwrap_or(Request::Nothing))
+    fn obey(
+        &mut self,
+        now: Instant,
+        line: &str,
+        requests: &StationRequests<'_>,
+        config: &mut VehicleConfig,
+    ) -> Request<Command> {
+        requests.console(config, |vehicle| answer(line, now, vehicle, &mut self.screen).unwrap_or(Request::Nothing))
     }
 }
 

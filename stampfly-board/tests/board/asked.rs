@@ -10,8 +10,8 @@ use stampfly_flight::console::Request;
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, NotTaken, Payload, Refused, Station, Vehicle};
 use stampfly_services::association::NAMES;
-use stampfly_services::desk::{Desk, Post, Room};
 use stampfly_services::network::Reserved;
+use stampfly_services::requests::{QueuedPayload, Room, StationRequests};
 use stampfly_types::Message;
 use stampfly_types::messages::FlightStatus;
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ fn key(with: u8) -> Key {
 struct Air<'b> {
     bench: Bench<'b>,
     station: Station,
-    desk: Desk,
+    questions: StationRequests,
     config: VehicleConfig,
     armed: bool,
     /// What the station has heard.
@@ -39,8 +39,15 @@ impl<'b> Air<'b> {
         let mut bench = Bench::with_key(bus, Some(OLD), Some(Vehicle::new(key(0x5A))));
         bench.pass(6_000, false, &[]);
         let (config, heard, requests) = (VehicleConfig::default(), Vec::new(), Vec::new());
-        let mut air =
-            Self { bench, station: Station::new(station), desk: Desk::new(), config, armed: false, heard, requests };
+        let mut air = Self {
+            bench,
+            station: Station::new(station),
+            questions: StationRequests::new(),
+            config,
+            armed: false,
+            heard,
+            requests,
+        };
         (0..20).for_each(|_| air.turn());
         air
     }
@@ -68,8 +75,10 @@ impl<'b> Air<'b> {
     }
 
     fn arrive(&mut self, mut frame: Vec<u8>) {
-        if let Ok(Some(received)) = self.bench.link.receive(&mut self.bench.helm, self.bench.now, STATION, &mut frame) {
-            assert!(self.desk.ask(0, &received.payload), "{:?}", received.payload);
+        if let Ok(Some(received)) =
+            self.bench.link.receive(&mut self.bench.arbiter, self.bench.now, STATION, &mut frame)
+        {
+            assert!(self.questions.ask(0, &received.payload), "{:?}", received.payload);
         }
     }
 
@@ -81,11 +90,11 @@ impl<'b> Air<'b> {
         let mut vehicle =
             Console { version: "1.0", newest: &newest, sensors: &[], profile: &profile, facts: &[], config };
         let mut room = Room::default();
-        let Some(answer) = self.desk.answer(self.bench.now, &mut vehicle, &mut room) else { return };
-        let post = Post::of(&answer.payload).expect("an answer");
+        let Some(answer) = self.questions.answer(self.bench.now, &mut vehicle, &mut room) else { return };
+        let post = QueuedPayload::of(&answer.payload).expect("an answer");
         if answer.request != Request::Nothing {
             self.requests.push(answer.request);
-            self.desk.report(&"done");
+            self.questions.report(&"done");
         }
         let mut frame = [0; MAX_FRAME];
         let sealed = self.bench.link.guarded.seal(self.bench.now, &post.payload(), &mut frame);
@@ -202,7 +211,7 @@ fn without_the_key_nothing_is_answered_and_every_frame_is_counted() {
     for bit in 0..8 {
         let mut forged = sealed.clone();
         *forged.last_mut().expect("a tag") ^= 1 << bit;
-        let heard = air.bench.link.receive(&mut air.bench.helm, air.bench.now, STATION, &mut forged).map(drop);
+        let heard = air.bench.link.receive(&mut air.bench.arbiter, air.bench.now, STATION, &mut forged).map(drop);
         assert_eq!(heard, Err(NotTaken::Secure(Refused::Tag)));
         air.bench.pass(5, false, &[]);
     }

@@ -10,7 +10,7 @@ use stampfly_bus::{Band, Taps};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::secure::{Guarded, MAX_FRAME, NotTaken, Policy, Vehicle};
 use stampfly_link::{Address, ControlPacket, Session};
-use stampfly_services::Helm;
+use stampfly_services::CommandArbiter;
 use stampfly_types::messages::{
     ArmBlocks, BaroData, FlightStatus, FlowData, GuidedCommand, GuidedKind, ImuData, MotorOutput, PilotInput,
     PowerData, TofData,
@@ -41,7 +41,7 @@ pub struct Bench<'b> {
     pub ends: Ends<'b>,
     pub link: Link<'b>,
     /// Who commands, as the firmware has it.
-    pub helm: Helm,
+    pub arbiter: CommandArbiter,
     randoms: u64,
     /// What the vehicle has sent.
     pub said: Vec<Vec<u8>>,
@@ -78,7 +78,7 @@ impl<'b> Bench<'b> {
             flight,
             ends,
             link,
-            helm: Helm::new(),
+            arbiter: CommandArbiter::new(),
             randoms: 0,
             said: Vec::new(),
             taps,
@@ -154,7 +154,7 @@ impl<'b> Bench<'b> {
                 for (source, arm) in air {
                     let sticks = PilotInput { arm: *arm, ..Default::default() };
                     let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
-                    last = Some(self.link.receive(&mut self.helm, now, *source, &mut bytes).map(drop));
+                    last = Some(self.link.receive(&mut self.arbiter, now, *source, &mut bytes).map(drop));
                 }
                 for what in Outgoing::ALL {
                     let said = self.say(now, what);

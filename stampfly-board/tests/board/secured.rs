@@ -5,7 +5,7 @@ use stampfly_board::link::Outgoing;
 use stampfly_board::topics::{self, Id};
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, NotTaken, Payload, Refused, Station, Vehicle};
-use stampfly_services::{Refusal, Seat};
+use stampfly_services::{Refusal, Requester};
 use stampfly_types::Duration;
 use stampfly_types::messages::{
     Alerts, CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, PilotInput, SystemAlert,
@@ -29,7 +29,7 @@ fn talk(bench: &mut Bench<'_>, station: &mut Station, armed: bool) -> u32 {
         }
         let mut room = [0; MAX_FRAME];
         if let Some(frame) = station.transmit(bench.now, [turn + 1; 8], &mut room).map(<[u8]>::to_vec) {
-            let _ = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone());
+            let _ = bench.link.receive(&mut bench.arbiter, bench.now, STATION, &mut frame.clone());
         }
     }
     acknowledged
@@ -37,7 +37,7 @@ fn talk(bench: &mut Bench<'_>, station: &mut Station, armed: bool) -> u32 {
 
 fn say(bench: &mut Bench<'_>, station: &mut Station, payload: &Payload<'_>) -> Vec<u8> {
     let frame = station.seal(bench.now, payload, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
-    assert_eq!(bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone()), Ok(None), "{payload:?}");
+    assert_eq!(bench.link.receive(&mut bench.arbiter, bench.now, STATION, &mut frame.clone()), Ok(None), "{payload:?}");
     frame
 }
 
@@ -61,7 +61,7 @@ fn every_form_of_a_kill_stops_the_motors_and_commands_are_acknowledged() {
         let frame = say(&mut bench, &mut station, &kill);
         bench.pass(5, false, &[]);
         assert!(!bench.armed(), "{kill:?}");
-        let again = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame.clone()).map(drop);
+        let again = bench.link.receive(&mut bench.arbiter, bench.now, STATION, &mut frame.clone()).map(drop);
         assert_eq!(again, Err(NotTaken::Secure(Refused::Old)));
         assert_eq!(talk(&mut bench, &mut station, false), acknowledgements, "{kill:?}");
     }
@@ -76,7 +76,7 @@ fn what_only_services_can_answer_is_handed_out_and_telemetry_is_sealed() {
     talk(&mut bench, &mut station, false);
     let line = station.seal(bench.now, &Payload::Line("status"), &mut [0; MAX_FRAME]).expect("sealed").to_vec();
     let mut line = line;
-    let received = bench.link.receive(&mut bench.helm, bench.now, STATION, &mut line).expect("taken");
+    let received = bench.link.receive(&mut bench.arbiter, bench.now, STATION, &mut line).expect("taken");
     assert_eq!(received.map(|received| received.payload), Some(Payload::Line("status")));
 
     let mut kinds = Vec::new();
@@ -89,7 +89,7 @@ fn what_only_services_can_answer_is_handed_out_and_telemetry_is_sealed() {
     assert_eq!(kinds, [stampfly_link::secure::Kind::Telemetry, stampfly_link::secure::Kind::Sample]);
 }
 
-const PAGE: Seat = Seat::Page(1);
+const PAGE: Requester = Requester::Page(1);
 const OTHER_STATION: Address = Address([2, 0, 0, 0, 0, 8]);
 
 fn guided(kind: GuidedKind) -> GuidedCommand {
@@ -97,9 +97,9 @@ fn guided(kind: GuidedKind) -> GuidedCommand {
 }
 
 /// A page asks, as at a port.
-fn ask(bench: &mut Bench<'_>, seat: Seat, kind: GuidedKind) -> Result<(), Refusal> {
-    let Bench { helm, link, now, .. } = bench;
-    helm.guide(*now, seat, guided(kind), &mut |passed| {
+fn ask(bench: &mut Bench<'_>, requester: Requester, kind: GuidedKind) -> Result<(), Refusal> {
+    let Bench { arbiter, link, now, .. } = bench;
+    arbiter.guide(*now, requester, guided(kind), &mut |passed| {
         let stampfly_services::Passed::Command(command) = passed else { panic!("{passed:?}") };
         link.command(*now, command).then_some(()).ok_or(Refusal::Full)
     })
@@ -116,9 +116,9 @@ fn heard(
     for _ in 0..millis / 20 {
         bench.pass(20, false, &[]);
         each(bench, station);
-        let Bench { helm, link, now, said, .. } = bench;
-        link.keep(helm, *now);
-        said.extend(link.notice(helm, *now, &mut room).map(|(_, bytes)| bytes.to_vec()));
+        let Bench { arbiter, link, now, said, .. } = bench;
+        link.keep(arbiter, *now);
+        said.extend(link.notice(arbiter, *now, &mut room).map(|(_, bytes)| bytes.to_vec()));
         for mut frame in core::mem::take(said) {
             match station.receive(*now, &mut frame).ok().flatten().map(|received| received.payload) {
                 Some(Payload::Refusal { counter, why }) => texts.push(format!("{counter}: {why}")),
@@ -128,7 +128,7 @@ fn heard(
             }
         }
         if let Some(frame) = station.transmit(*now, now.as_micros().to_le_bytes(), &mut room).map(<[u8]>::to_vec) {
-            let _ = link.receive(helm, *now, STATION, &mut frame.clone());
+            let _ = link.receive(arbiter, *now, STATION, &mut frame.clone());
         }
     }
     texts
@@ -146,7 +146,7 @@ fn ready<'b>(bus: &'b mut topics::Bus) -> (Bench<'b>, Station) {
 /// From another address, in the same session.
 fn say_from(bench: &mut Bench<'_>, station: &mut Station, from: Address, payload: &Payload<'_>) {
     let mut frame = station.seal(bench.now, payload, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
-    assert_eq!(bench.link.receive(&mut bench.helm, bench.now, from, &mut frame), Ok(None), "{payload:?}");
+    assert_eq!(bench.link.receive(&mut bench.arbiter, bench.now, from, &mut frame), Ok(None), "{payload:?}");
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn a_station_is_refused_while_a_page_commands_and_told_who_does_and_what_was_don
     say(&mut bench, &mut station, &Payload::Numbered { number, command: guided(GuidedKind::TakeOff) });
     let told = heard(&mut bench, &mut station, 500, |_, _| {});
     assert!(told.contains(&"41: page 1 commands".to_owned()) && !told.contains(&"41: true".to_owned()), "{told:?}");
-    assert_eq!(bench.helm.holder(bench.now), Some(PAGE));
+    assert_eq!(bench.arbiter.holder(bench.now), Some(PAGE));
 
     // Its sticks, too, and it is told so now and then.
     let told = heard(&mut bench, &mut station, 1_000, |bench, station| {
@@ -238,7 +238,7 @@ fn a_command_that_the_vehicle_takes_and_does_not_do_is_refused_three_times_after
             }
         }
         if let Some(frame) = station.transmit(now, now.as_micros().to_le_bytes(), &mut room).map(<[u8]>::to_vec) {
-            let _ = bench.link.receive(&mut bench.helm, now, STATION, &mut frame.clone());
+            let _ = bench.link.receive(&mut bench.arbiter, now, STATION, &mut frame.clone());
         }
     }
     assert_eq!(told.len(), 3, "{told:?}");
@@ -264,7 +264,7 @@ fn a_page_is_refused_while_a_station_commands_by_words_or_by_sticks() {
             }
         });
         assert!(bench.armed(), "{arm:?}");
-        let Some(holder @ Seat::Link(_)) = bench.helm.holder(bench.now) else { panic!("{arm:?}") };
+        let Some(holder @ Requester::Link(_)) = bench.arbiter.holder(bench.now) else { panic!("{arm:?}") };
         assert_eq!(ask(&mut bench, PAGE, GuidedKind::TakeOff), Err(Refusal::Occupied(holder)));
         assert_eq!(ask(&mut bench, PAGE, GuidedKind::Kill), Ok(()));
         heard(&mut bench, &mut station, 100, |_, _| {});
@@ -293,14 +293,14 @@ fn another_station_and_a_page_do_not_keep_a_vehicle_armed_whose_station_has_left
             let centred = Payload::Sticks(PilotInput { arm: true, ..PilotInput::default() });
             say_from(bench, station, OTHER_STATION, &centred);
             let now = bench.now;
-            assert!(!bench.helm.alive(now, PAGE));
+            assert!(!bench.arbiter.alive(now, PAGE));
         });
         if alerts(&bench).contains(Alerts::COMM_LOST) {
             silent.get_or_insert(turn * 20);
         }
     }
     assert!(silent.is_some_and(|ms| (2_500..=3_600).contains(&ms)), "{silent:?} ms after its last sign");
-    assert_eq!(bench.helm.holder(bench.now), None);
+    assert_eq!(bench.arbiter.holder(bench.now), None);
     say_from(&mut bench, &mut station, OTHER_STATION, &Payload::Guided(guided(GuidedKind::Disarm)));
     heard(&mut bench, &mut station, 100, |_, _| {});
     assert!(!bench.armed());
@@ -313,8 +313,8 @@ fn the_paired_transmitter_is_a_seat_and_a_page_that_flies_by_hand_does_not_share
     bench.pass(6_000, false, &[(OLD, false)]);
     bench.pass(500, false, &[(OLD, true)]);
     assert!(bench.armed());
-    assert_eq!(bench.helm.holder(bench.now), Some(Seat::Transmitter));
-    assert_eq!(ask(&mut bench, PAGE, GuidedKind::TakeOff), Err(Refusal::Occupied(Seat::Transmitter)));
+    assert_eq!(bench.arbiter.holder(bench.now), Some(Requester::Transmitter));
+    assert_eq!(ask(&mut bench, PAGE, GuidedKind::TakeOff), Err(Refusal::Occupied(Requester::Transmitter)));
     bench.pass(200, false, &[(OLD, false)]);
     assert!(!bench.armed());
 
@@ -325,8 +325,8 @@ fn the_paired_transmitter_is_a_seat_and_a_page_that_flies_by_hand_does_not_share
     for turn in 0..100 {
         let input = PilotInput { arm: turn > 20, ..PilotInput::default() };
         let (now, status) = (bench.now, bench.newest::<FlightStatus>(Id::flight_status));
-        let Bench { helm, link, .. } = &mut bench;
-        let _ = helm.steer(now, PAGE, &input, &status, &mut |passed| {
+        let Bench { arbiter, link, .. } = &mut bench;
+        let _ = arbiter.steer(now, PAGE, &input, &status, &mut |passed| {
             if let stampfly_services::Passed::Sticks(input) = passed {
                 link.sticks(now, &input);
             }
@@ -336,7 +336,7 @@ fn the_paired_transmitter_is_a_seat_and_a_page_that_flies_by_hand_does_not_share
         assert!(bench.armed() || !was_armed, "it stays armed, turn {turn}");
         was_armed = bench.armed();
     }
-    assert!(was_armed && bench.helm.holder(bench.now) == Some(PAGE));
+    assert!(was_armed && bench.arbiter.holder(bench.now) == Some(PAGE));
 }
 
 #[test]
@@ -367,5 +367,5 @@ fn a_station_that_watches_does_not_silence_the_transmitter_that_flies_and_is_ref
 fn say_watch(bench: &mut Bench<'_>, station: &mut Station) {
     let watch = Payload::Watch { topic: 3, period: 40 };
     let mut frame = station.seal(bench.now, &watch, &mut [0; MAX_FRAME]).expect("sealed").to_vec();
-    assert!(matches!(bench.link.receive(&mut bench.helm, bench.now, STATION, &mut frame), Ok(Some(_))));
+    assert!(matches!(bench.link.receive(&mut bench.arbiter, bench.now, STATION, &mut frame), Ok(Some(_))));
 }

@@ -1,7 +1,7 @@
 //! Who commands a vehicle behind `connect`: which page, and which program.
 //!
 //! At the vehicle's end all pages are one station, and programs of the same system and component
-//! number are one. So this end tells them apart: pages ask a [`Helm`], as at the ports of a
+//! number are one. So this end tells them apart: pages ask a [`CommandArbiter`], as at the ports of a
 //! simulated vehicle, and numbers belong to the connection that has used them first. What others
 //! say with them does not keep a vehicle in the air whose commander has left.
 
@@ -9,7 +9,7 @@
 
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
-use stampfly_services::{Helm, Passed, Refusal, Seat};
+use stampfly_services::{CommandArbiter, Passed, Refusal, Requester};
 use stampfly_sim::ask::{Ask, Guided};
 use stampfly_sim::vehicle::Client;
 use stampfly_types::messages::{FlightStatus, GuidedCommand, PilotInput};
@@ -33,7 +33,7 @@ const READS: [u32; 6] = [
 /// Who commands.
 #[derive(Debug, Default)]
 pub(super) struct Crew {
-    helm: Helm,
+    arbiter: CommandArbiter,
     /// Systems and components, who uses them, and when they were last heard.
     numbers: HashMap<[u8; 2], (Client, Instant)>,
     /// The vehicle's newest.
@@ -47,15 +47,15 @@ impl Crew {
     /// When another page commands.
     pub fn ask(&mut self, now: Instant, page: u64, ask: &Ask) -> Result<Option<Ask>, Refusal> {
         self.keep(now);
-        let seat = Seat::Page(page as u32);
+        let requester = Requester::Page(page as u32);
         match ask {
             Ask::Guided(guided) => {
-                self.helm.guide(now, seat, GuidedCommand::from(*guided), &mut |_| Ok(()))?;
+                self.arbiter.guide(now, requester, GuidedCommand::from(*guided), &mut |_| Ok(()))?;
             }
             Ask::Sticks(sticks) => {
                 let mut passed = None;
                 // A page sends its sticks as long as it is open, and knows from the commander's name that they do not fly.
-                _ = self.helm.steer(now, seat, &PilotInput::from(*sticks), &self.status, &mut |what| {
+                _ = self.arbiter.steer(now, requester, &PilotInput::from(*sticks), &self.status, &mut |what| {
                     passed = Some(what);
                     Ok(())
                 });
@@ -65,7 +65,7 @@ impl Crew {
                     Passed::Command(_) => Ask::Guided(Guided::Land {}),
                 }));
             }
-            Ask::Alive {} if !self.helm.alive(now, seat) => return Ok(None),
+            Ask::Alive {} if !self.arbiter.alive(now, requester) => return Ok(None),
             _ => {}
         }
         Ok(Some(ask.clone()))
@@ -73,23 +73,23 @@ impl Crew {
 
     /// Time goes on: the lease ends with the flight.
     pub fn keep(&mut self, now: Instant) {
-        self.helm.keep(now, self.status.armed, &mut |_| Ok(()));
+        self.arbiter.keep(now, self.status.armed, &mut |_| Ok(()));
     }
 
     /// Who commands, as far as it is known here: a page and its number, or in words. Empty when none
     /// does.
     pub fn commander(&self, now: Instant) -> (String, Option<u64>) {
-        match self.helm.holder(now) {
-            Some(seat @ Seat::Page(number)) => (seat.to_string(), Some(number.into())),
+        match self.arbiter.holder(now) {
+            Some(requester @ Requester::Page(number)) => (requester.to_string(), Some(number.into())),
             // No page had the lease: if the vehicle is led, it is led by a program.
-            _ if self.helm.taker().is_none() => ("another program".to_owned(), None),
+            _ if self.arbiter.taker().is_none() => ("another program".to_owned(), None),
             _ => (String::new(), None),
         }
     }
 
     /// This page is gone.
     pub fn leave(&mut self, page: u64) {
-        self.helm.leave(|seat| seat == Seat::Page(page as u32));
+        self.arbiter.leave(|requester| requester == Requester::Page(page as u32));
     }
 
     /// The vehicle is in this state. With motors off there is nothing to hold.
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(arm.clone())));
         crew.see(FlightStatus { armed: true, ..FlightStatus::default() });
         assert_eq!(crew.ask(at(0), 1, &arm), Ok(Some(arm.clone())));
-        assert_eq!(crew.ask(at(1), 2, &arm), Err(Refusal::Occupied(Seat::Page(1))));
+        assert_eq!(crew.ask(at(1), 2, &arm), Err(Refusal::Occupied(Requester::Page(1))));
         for (page, passes) in [(1, true), (2, false)] {
             assert_eq!(crew.ask(at(1), page, &Ask::Alive {}).map(|ask| ask.is_some()), Ok(passes));
             assert_eq!(crew.ask(at(1), page, &sticks).map(|ask| ask.is_some()), Ok(passes));

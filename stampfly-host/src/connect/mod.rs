@@ -49,7 +49,7 @@ use stampfly_link::mavlink::dialects::common::{
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersion, MavlinkWriter, MessageData as _};
 use stampfly_link::secure::Key;
 use stampfly_services::mavlink::{Pulse, ends_a_flight};
-use stampfly_services::{Asked as Done, Seat, Told};
+use stampfly_services::{Asked as Done, CommandNotice, Requester};
 use stampfly_sim::vehicle::{Client, Heard, PortSpec, Ports as _, Setting, Vehicle};
 use stampfly_types::Message as _;
 use stampfly_types::messages::{FlightStatus, GuidedCommand};
@@ -348,7 +348,7 @@ impl<V: Vehicle> Ends<V> {
             Ok(Some(ask)) => {
                 if let Ask::Guided(guided) = ask {
                     let what = Done::Command(GuidedCommand::from(guided).kind);
-                    let text = Told { seat: Seat::Page(client.number() as u32), what }.to_string();
+                    let text = CommandNotice { requester: Requester::Page(client.number() as u32), what }.to_string();
                     self.hub.tell_all(ONLY, &Event::Text { text });
                 }
                 return Some(Asked { ask, ..asked });

@@ -12,7 +12,7 @@ use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkFrame, MavlinkVersi
 use stampfly_link::secure::Payload;
 use stampfly_param::{ParameterError, ParameterInfo, Parameters};
 use stampfly_services::cable::{Assembly, Envelope, Part, Split, TYPE, fingerprint};
-use stampfly_services::desk;
+use stampfly_services::requests;
 use stampfly_sim::vehicle::Setting;
 use stampfly_types::messages::{GuidedCommand, GuidedKind};
 use std::collections::{HashMap, VecDeque};
@@ -353,8 +353,8 @@ impl Station {
 
     /// A line that is typed when those before are answered.
     fn queue(&mut self, since: Instant, client: Client, asked: Asked, line: String, tell: Tell<'_>) {
-        if line.len() > desk::LINE {
-            tell(Said::Answer(client, asked, Err(format!("longer than {} characters", desk::LINE))));
+        if line.len() > requests::LINE {
+            tell(Said::Answer(client, asked, Err(format!("longer than {} characters", requests::LINE))));
         } else if self.lines.len() >= LINES {
             tell(Said::Answer(client, asked, Err("one line after the other".into())));
         } else {

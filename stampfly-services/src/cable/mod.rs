@@ -17,11 +17,11 @@ pub use crate::watches::Watches;
 pub use envelope::{Assembly, BODY, Envelope, PART, TUNNEL, TYPE, fingerprint};
 pub use split::{PAUSE, Part, Split};
 
-use crate::cockpit::Cockpit;
-use crate::deed::{Deed, OVERTAKEN, TOO_MANY, Waited};
-use crate::desk::{Answer, Desk, Room};
+use crate::access::VehicleAccess;
+use crate::goal::{CommandGoal, OVERTAKEN, TOO_MANY, Waited};
 use crate::mavlink::{Identity, Mavlink};
-use crate::refusal::Seat;
+use crate::refusal::Requester;
+use crate::requests::{Answer, Room, StationRequests};
 use crate::view::Samples;
 use stampfly_flight::console::{Request, Vehicle};
 use stampfly_link::mavlink::Tunnel;
@@ -60,13 +60,13 @@ pub type Put<'p> = &'p mut dyn FnMut(&[u8]);
 /// One serial line, at which a station may watch up to `WATCHED` topics and upload a mission of up
 /// to `ITEMS` items.
 ///
-/// Give it what is heard with [`hear`](Self::hear), which hands what a person types to a terminal;
+/// Give it what is heard with [`hear`](Self::hear), which actions what a person types to a terminal;
 /// call [`poll`](Self::poll) and [`answer`](Self::answer) about a hundred times a second.
 #[derive(Clone, Debug)]
 pub struct Cable<const WATCHED: usize, const ITEMS: usize = { crate::mavlink::ITEMS }> {
     split: Split,
     mavlink: Mavlink<(), 1, ITEMS>,
-    desk: Desk,
+    requests: StationRequests,
     watches: Watches<WATCHED>,
     table: u16,
     /// When the station was heard.
@@ -87,7 +87,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         Self {
             split: Split::new(),
             mavlink: Mavlink::for_clients(identity),
-            desk: Desk::new(),
+            requests: StationRequests::new(),
             watches: Watches::new(),
             table,
             station: None,
@@ -115,19 +115,19 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         &mut self,
         now: Instant,
         bytes: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_>,
         typed: &mut dyn FnMut(u8),
     ) {
-        self.hear_any(now, false, bytes, cockpit, put, typed);
+        self.hear_any(now, false, bytes, access, put, typed);
     }
 
     /// The same of what lay in the caller's queue for more than a second: frames of MAVLink are
     /// [late](Mavlink::hear_late), a station has said itself when it has spoken, and what a person
     /// has typed is dropped. Returns whether anything was.
-    pub fn hear_late(&mut self, now: Instant, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) -> bool {
+    pub fn hear_late(&mut self, now: Instant, bytes: &[u8], access: &mut dyn VehicleAccess, put: Put<'_>) -> bool {
         let mut is_dropped = false;
-        self.hear_any(now, true, bytes, cockpit, put, &mut |_| is_dropped = true);
+        self.hear_any(now, true, bytes, access, put, &mut |_| is_dropped = true);
         is_dropped
     }
 
@@ -136,7 +136,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
         now: Instant,
         is_late: bool,
         bytes: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_>,
         typed: &mut dyn FnMut(u8),
     ) {
@@ -149,17 +149,17 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             }
             // A byte ends one frame at most.
             let mut tunnel = None;
-            let mut keep = |seat: Seat, heard: Tunnel| tunnel = Some((seat, heard));
+            let mut keep = |requester: Requester, heard: Tunnel| tunnel = Some((requester, heard));
             let answer = &mut |(): &(), frame: &[u8]| put(frame);
-            self.mavlink.hear_tunnels(now, (), (&[*byte], is_late), cockpit, answer, &mut keep);
-            if let Some((seat, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
-                self.open(now, seat, &tunnel.bytes, cockpit, put);
+            self.mavlink.hear_tunnels(now, (), (&[*byte], is_late), access, answer, &mut keep);
+            if let Some((requester, tunnel)) = tunnel.filter(|(_, tunnel)| tunnel.kind == TYPE) {
+                self.open(now, requester, &tunnel.bytes, access, put);
             }
         }
     }
 
     /// Opens an envelope.
-    fn open(&mut self, now: Instant, seat: Seat, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_>) {
+    fn open(&mut self, now: Instant, requester: Requester, bytes: &[u8], access: &mut dyn VehicleAccess, put: Put<'_>) {
         // What a station says is short: one part.
         let Some((envelope, body)) = Envelope::read(bytes) else { return };
         let Some(payload) = Payload::decode(envelope.kind, body) else { return };
@@ -185,10 +185,10 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             return;
         }
         let command = match payload {
-            Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return cockpit.alive(now, seat),
+            Payload::Guided(GuidedCommand { kind: GuidedKind::None, .. }) => return access.alive(now, requester),
             // They come again and again, and are not answered.
             Payload::Sticks(input) => {
-                _ = cockpit.steer(now, seat, &input);
+                _ = access.steer(now, requester, &input);
                 return;
             }
             Payload::Watch { topic, period } => {
@@ -198,23 +198,23 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
             payload => match payload.command() {
                 Some(command) => command,
                 None => {
-                    if !self.desk.ask(number, &payload) {
+                    if !self.requests.ask(number, &payload) {
                         self.say(number, &Payload::Reply { text: "one question after the other", last: true }, put);
                     }
                     return;
                 }
             },
         };
-        let deed = Deed::of(command.kind);
+        let goal = CommandGoal::of(command.kind);
         let mut words = heapless::String::<96>::new();
-        if deed.is_some_and(|deed| deed.refuse(&cockpit.view().state(), &mut words)) {
+        if goal.is_some_and(|goal| goal.refuse(&access.view().state(), &mut words)) {
             return self.say(number, &Payload::Reply { text: &words, last: true }, put);
         }
-        if self.waits.is_full() && deed.is_some_and(|deed| !deed.ends_a_flight()) {
+        if self.waits.is_full() && goal.is_some_and(|goal| !goal.ends_a_flight()) {
             return self.say(number, &Payload::Reply { text: TOO_MANY, last: true }, put);
         }
-        let waited = deed.map(|deed| Waited::new(now, deed, cockpit));
-        match cockpit.guide(now, seat, command) {
+        let waited = goal.map(|goal| Waited::new(now, goal, access));
+        match access.guide(now, requester, command) {
             // Acknowledged when it is seen to have happened.
             Ok(()) if let Some(waited) = waited => {
                 let Err(new) = self.waits.push((number, waited)) else { return };
@@ -232,10 +232,10 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     }
 
     /// Acknowledges commands that are seen to have happened, and says of others why they did not.
-    fn settle(&mut self, now: Instant, cockpit: &dyn Cockpit, put: Put<'_>) {
+    fn settle(&mut self, now: Instant, access: &dyn VehicleAccess, put: Put<'_>) {
         let Self { waits, mavlink, table, .. } = self;
         waits.retain(|(number, waited)| {
-            let Some(result) = waited.look(now, cockpit) else { return true };
+            let Some(result) = waited.look(now, access) else { return true };
             let payload = match result {
                 Ok(()) => Payload::Acknowledgement { counter: (*number).into(), taken: true },
                 Err(text) => Payload::Reply { text, last: true },
@@ -246,8 +246,8 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     }
 
     /// The line is gone, with all who command over it.
-    pub fn close(&mut self, cockpit: &mut dyn Cockpit) {
-        self.mavlink.close((), cockpit);
+    pub fn close(&mut self, access: &mut dyn VehicleAccess) {
+        self.mavlink.close((), access);
         self.forget();
     }
 
@@ -255,15 +255,15 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     fn forget(&mut self) {
         self.waits.clear();
         self.watches.clear();
-        self.desk.clear();
+        self.requests.clear();
     }
 
     /// Sends what is due: MAVLink's streams fifty times a second at most, and the station's topics.
-    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, samples: &dyn Samples, put: Put<'_>) {
-        self.mavlink.poll(now, cockpit, &mut |(), frame| put(frame));
-        self.settle(now, cockpit, put);
+    pub fn poll(&mut self, now: Instant, access: &mut dyn VehicleAccess, samples: &dyn Samples, put: Put<'_>) {
+        self.mavlink.poll(now, access, &mut |(), frame| put(frame));
+        self.settle(now, access, put);
         let is_spoken = self.is_spoken(now);
-        while let Some((number, what)) = cockpit.told(self.told) {
+        while let Some((number, what)) = access.told(self.told) {
             self.told = number;
             if is_spoken {
                 let mut text = heapless::String::<96>::new();
@@ -289,7 +289,9 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     pub fn answer<V: Vehicle>(&mut self, now: Instant, vehicle: &mut V, put: Put<'_>) -> Request<V::Request> {
         let mut room = Room::default();
         for _ in 0..AT_ONCE {
-            let Some(Answer { number, payload, request }) = self.desk.answer(now, vehicle, &mut room) else { break };
+            let Some(Answer { number, payload, request }) = self.requests.answer(now, vehicle, &mut room) else {
+                break;
+            };
             send(&mut self.mavlink, self.table, number, &payload, put);
             if !matches!(request, Request::Nothing) {
                 return request;
@@ -299,9 +301,9 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
     }
 
     /// What the station has said last of the flight record: that it is wanted, or is not; once. See
-    /// [`Tape`](crate::Tape).
+    /// [`RecordSubscription`](crate::RecordSubscription).
     pub const fn record(&mut self) -> Option<bool> {
-        self.desk.record()
+        self.requests.record()
     }
 
     /// Sends a chunk of the flight record, of at most [`BODY`] bytes.
@@ -312,7 +314,7 @@ impl<const WATCHED: usize, const ITEMS: usize> Cable<WATCHED, ITEMS> {
 
     /// The board has done what it was asked for, or not.
     pub fn report(&mut self, what: &dyn core::fmt::Display) {
-        self.desk.report(what);
+        self.requests.report(what);
     }
 
     fn say(&mut self, number: u16, payload: &Payload<'_>, put: Put<'_>) {

@@ -17,7 +17,7 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
     turn: Turn<'_, '_, C, ITEMS>,
     message: &Heard,
 ) -> Option<Origin> {
-    let (now, own, seat) = (turn.now, turn.own, turn.seat);
+    let (now, own, requester) = (turn.now, turn.own, turn.requester);
     if turn.client.pulse.is_held() && is_an_order(message) {
         late(turn, message);
         return None;
@@ -56,10 +56,10 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
                 throttle: 2.0 * share(sticks.z) - 1.0,
                 yaw: share(sticks.r),
                 mode: FlightMode::PosHold,
-                arm: turn.cockpit.view().state().armed,
+                arm: turn.access.view().state().armed,
                 kill: false,
             };
-            if let Err(refusal) = turn.cockpit.steer(now, seat, &input.cleaned()) {
+            if let Err(refusal) = turn.access.steer(now, requester, &input.cleaned()) {
                 turn.client.complain(Unserved::Sticks, &refusal, turn.put);
             }
         }
@@ -67,10 +67,10 @@ pub(super) fn message<C: Copy + PartialEq, const ITEMS: usize>(
             turn.client.next_parameter = Some(0);
         }
         Heard::ParamRequestRead(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::read(turn.client, request, turn.asker, turn.cockpit.parameters(), turn.put);
+            parameters::read(turn.client, request, turn.asker, turn.access.parameters(), turn.put);
         }
         Heard::ParamSet(request) if own.is_meant(request.target_system, request.target_component) => {
-            parameters::set(turn.client, request, turn.asker, turn.cockpit, turn.put);
+            parameters::set(turn.client, request, turn.asker, turn.access, turn.put);
         }
         Heard::SetGpsGlobalOrigin(request) if own.is_meant(request.target_system, AUTOPILOT) => {
             return set_origin(
@@ -184,20 +184,20 @@ fn mission<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>
 }
 
 fn sign_of_life<C, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>) {
-    turn.cockpit.alive(turn.now, turn.seat);
-    turn.missions.runner.alive(turn.now, turn.seat);
+    turn.access.alive(turn.now, turn.requester);
+    turn.missions.runner.alive(turn.now, turn.requester);
 }
 
 /// A station says where on Earth the vehicle is. Not while a mission with places on Earth is flown, which would be elsewhere then; and not to a vehicle
 /// that knows.
 fn set_origin<C: Copy + PartialEq, const ITEMS: usize>(turn: Turn<'_, '_, C, ITEMS>, origin: Origin) -> Option<Origin> {
-    let Turn { now, own, client, missions, cockpit, put, .. } = turn;
+    let Turn { now, own, client, missions, access, put, .. } = turn;
     let moves = missions.is_global() && missions.runner.is_running();
-    let taken = (origin.is_sound() && !moves && cockpit.origin().is_none()).then_some(origin);
+    let taken = (origin.is_sound() && !moves && access.origin().is_none()).then_some(origin);
     // What it is now, so that a station sees whether it was taken.
     let now_own = Own { origin: taken.or(own.origin), ..*own };
     for id in [49, 242] {
-        if let Some(message) = streams::make(id, now, &now_own, &cockpit.view()) {
+        if let Some(message) = streams::make(id, now, &now_own, &access.view()) {
             client.send(&message, put);
         }
     }

@@ -19,7 +19,7 @@
 
 use super::client::{Client, Put};
 use super::commands;
-use crate::cockpit::{Cockpit, Request};
+use crate::access::{Request, VehicleAccess};
 use crate::refusal::Refusal;
 use core::fmt::Write;
 use heapless::String;
@@ -146,7 +146,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
         client: &mut Client<C>,
         asker: [u8; 2],
         parameters: &[f32; 7],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
     ) -> Result<(), MavResult> {
         let kind = match wanted(parameters) {
@@ -158,7 +158,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
             }
         };
         if kind == CalibrationKind::None {
-            return match cockpit.request(now, Request::Calibrate(kind)) {
+            return match access.request(now, Request::Calibrate(kind)) {
                 // Whoever has asked for it hears it from the vehicle.
                 Ok(()) => Err(MavResult::MAV_RESULT_ACCEPTED),
                 Err(refusal) => Err(refused(refusal)),
@@ -174,7 +174,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
             Some(asked) if asked.client != client.id => return Err(MavResult::MAV_RESULT_TEMPORARILY_REJECTED),
             _ => {}
         }
-        if let Err(refusal) = cockpit.request(now, Request::Calibrate(kind)) {
+        if let Err(refusal) = access.request(now, Request::Calibrate(kind)) {
             say(client, format_args!("calibration failed: {refusal}"), put);
             return Err(refused(refusal));
         }
@@ -188,7 +188,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
     }
 
     /// Tells who has asked how far it is, and takes what was found.
-    pub fn poll(&mut self, now: Instant, clients: &mut [Client<C>], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+    pub fn poll(&mut self, now: Instant, clients: &mut [Client<C>], access: &mut dyn VehicleAccess, put: Put<'_, C>) {
         let Self { asked: waiting, news } = self;
         let Some(asked) = waiting else { return };
         // Nobody is left to be told; the vehicle goes on, and nothing is taken.
@@ -196,7 +196,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
             *waiting = None;
             return;
         };
-        let report = cockpit.view().calibration_report().filter(|(at, _)| *at >= asked.at).map(|(_, report)| report);
+        let report = access.view().calibration_report().filter(|(at, _)| *at >= asked.at).map(|(_, report)| report);
         let Some(report) = report else {
             if !asked.has_begun && now.since(asked.at) >= BEGINS {
                 say(client, format_args!("calibration failed: it does not begin"), put);
@@ -222,7 +222,7 @@ impl<C: Copy + PartialEq> Calibrating<C> {
                 }
                 return;
             }
-            CalibrationStage::Done => match cockpit.request(now, Request::AcceptCalibration(report)) {
+            CalibrationStage::Done => match access.request(now, Request::AcceptCalibration(report)) {
                 Ok(()) => MavResult::MAV_RESULT_ACCEPTED,
                 Err(_) => MavResult::MAV_RESULT_FAILED,
             },

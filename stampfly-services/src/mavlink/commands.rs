@@ -1,6 +1,6 @@
 //! Commands, and what becomes of each.
 //!
-//! What changes the vehicle's state is acknowledged when it [has happened](crate::deed); arming
+//! What changes the vehicle's state is acknowledged when it [has happened](crate::goal); arming
 //! that would be refused is denied at once, with the reasons as texts. What a program may ask for
 //! while another one commands is the [lease](crate::lease)'s decision, acknowledged as
 //! `NOT_IN_CONTROL`.
@@ -13,9 +13,9 @@ use super::missions::Missions;
 use super::orders::{Asked, Orders, Rise, say, take_off};
 use super::streams::{STREAMS, make, text};
 use super::unserved::Unserved;
-use crate::cockpit::{Cockpit, Request};
-use crate::deed::Deed;
-use crate::refusal::{Refusal, Seat};
+use crate::access::{Request, VehicleAccess};
+use crate::goal::CommandGoal;
+use crate::refusal::{Refusal, Requester};
 use stampfly_link::mavlink::MessageData;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{ArmBlocks, FlightStatus, GuidedCommand};
@@ -92,8 +92,8 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
     pub calibrating: &'t mut Calibrating<C>,
     pub orders: &'t mut Orders<C>,
     pub leading: &'t mut Leading<C>,
-    pub seat: Seat,
-    pub cockpit: &'t mut dyn Cockpit,
+    pub requester: Requester,
+    pub access: &'t mut dyn VehicleAccess,
     pub put: Put<'p, C>,
 }
 
@@ -101,8 +101,8 @@ pub(super) struct Turn<'t, 'p, C, const ITEMS: usize> {
 pub(super) fn obey<C: Copy + PartialEq, const ITEMS: usize>(mut turn: Turn<'_, '_, C, ITEMS>, command: &Command) {
     let number = command.kind as u16;
     let result = if command.kind == MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION {
-        let Turn { now, client, asker, calibrating, cockpit, put, .. } = &mut turn;
-        calibrating.ask(*now, client, *asker, &command.parameters, &mut **cockpit, &mut **put).err()
+        let Turn { now, client, asker, calibrating, access, put, .. } = &mut turn;
+        calibrating.ask(*now, client, *asker, &command.parameters, &mut **access, &mut **put).err()
     } else {
         turn.outcome(number, command)
     };
@@ -138,23 +138,25 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     /// What becomes of a command. `None`: it is acknowledged when it has happened.
     fn outcome(&mut self, number: u16, command: &Command) -> Option<MavResult> {
         let Command { kind, parameters: [p1, p2, p3, .., p7], is_repeated } = command;
-        let status = self.cockpit.view().state();
+        let status = self.access.view().state();
         // A mission may have begun since the acknowledgement that was lost: it is not ended.
-        let is_done = |deed: Deed| *is_repeated && deed.has_happened(&status);
+        let is_done = |goal: CommandGoal| *is_repeated && goal.has_happened(&status);
         Some(match kind {
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 && is_done(Deed::Arm) => MavResult::MAV_RESULT_ACCEPTED,
-            MavCmd::MAV_CMD_NAV_TAKEOFF if is_done(Deed::TakeOff) => MavResult::MAV_RESULT_ACCEPTED,
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => return self.does(number, Deed::Arm, *p7),
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 && is_done(CommandGoal::Arm) => {
+                MavResult::MAV_RESULT_ACCEPTED
+            }
+            MavCmd::MAV_CMD_NAV_TAKEOFF if is_done(CommandGoal::TakeOff) => MavResult::MAV_RESULT_ACCEPTED,
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 1.0 => return self.does(number, CommandGoal::Arm, *p7),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if *p1 == 0.0 => {
                 // 21196 says "whatever it does": motors off.
                 let force = *p2 == 21_196.0;
-                return self.does(number, if force { Deed::Kill } else { Deed::Disarm }, *p7);
+                return self.does(number, if force { CommandGoal::Kill } else { CommandGoal::Disarm }, *p7);
             }
-            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => return self.does(number, Deed::Kill, *p7),
-            MavCmd::MAV_CMD_NAV_TAKEOFF => return self.does(number, Deed::TakeOff, *p7),
-            MavCmd::MAV_CMD_NAV_LAND => return self.does(number, Deed::Land, *p7),
-            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => return self.does(number, Deed::Hold, *p7),
-            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => return self.does(number, Deed::Return, *p7),
+            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION if *p1 == 1.0 => return self.does(number, CommandGoal::Kill, *p7),
+            MavCmd::MAV_CMD_NAV_TAKEOFF => return self.does(number, CommandGoal::TakeOff, *p7),
+            MavCmd::MAV_CMD_NAV_LAND => return self.does(number, CommandGoal::Land, *p7),
+            MavCmd::MAV_CMD_NAV_LOITER_UNLIM => return self.does(number, CommandGoal::Hold, *p7),
+            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => return self.does(number, CommandGoal::Return, *p7),
             MavCmd::MAV_CMD_DO_SET_MODE => return self.set_mode(number, [*p1, *p2, *p3]),
             MavCmd::MAV_CMD_MISSION_START => match whole(*p1) {
                 Some(0) => self.start_mission(),
@@ -165,7 +167,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
                     MavResult::MAV_RESULT_DENIED
                 }
             },
-            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => return self.does(number, Deed::Hold, *p7),
+            MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 0.0 => return self.does(number, CommandGoal::Hold, *p7),
             MavCmd::MAV_CMD_DO_PAUSE_CONTINUE if *p1 == 1.0 => self.start_mission(),
             MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => {
                 match whole(*p1).is_some_and(|place| self.missions.set_current(place as usize)) {
@@ -195,43 +197,43 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
 
     /// Asks the vehicle for something that changes its state. `None`: it is acknowledged when that
     /// has happened. A take-off has a height, m.
-    fn does(&mut self, number: u16, deed: Deed, height: f32) -> Option<MavResult> {
-        let status = self.cockpit.view().state();
-        let asked = Asked { client: self.client.id, asker: self.asker, number, deed };
+    fn does(&mut self, number: u16, goal: CommandGoal, height: f32) -> Option<MavResult> {
+        let status = self.access.view().state();
+        let asked = Asked { client: self.client.id, asker: self.asker, number, goal };
         if self.orders.has(&asked) {
-            if deed.ends_a_flight() {
+            if goal.ends_a_flight() {
                 // Twice is once, and the first may have been lost on a radio.
-                _ = self.ask_for(deed, height);
+                _ = self.ask_for(goal, height);
             }
             return Some(MavResult::MAV_RESULT_IN_PROGRESS);
         }
-        if self.orders.is_full() && !deed.ends_a_flight() {
-            say(self.client, deed.denied(), &"too many commands at once", self.put);
+        if self.orders.is_full() && !goal.ends_a_flight() {
+            say(self.client, goal.denied(), &"too many commands at once", self.put);
             return Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
         }
         let height = if height.is_finite() && height > 0.0 { height } else { self.own.identity.take_off_height };
-        if deed == Deed::TakeOff && !status.armed && self.orders.is_arming() {
+        if goal == CommandGoal::TakeOff && !status.armed && self.orders.is_arming() {
             // Sent together with the command to arm: it waits for that.
-            self.orders.wait(self.now, asked, self.seat, Rise::Waits(height), self.cockpit);
+            self.orders.wait(self.now, asked, self.requester, Rise::Waits(height), self.access);
             return None;
         }
-        if deed == Deed::Arm && self.is_blocked(&status) {
+        if goal == CommandGoal::Arm && self.is_blocked(&status) {
             return Some(MavResult::MAV_RESULT_DENIED);
         }
-        if let Some(why) = deed.refusal(&status) {
-            say(self.client, deed.denied(), &why, self.put);
+        if let Some(why) = goal.refusal(&status) {
+            say(self.client, goal.denied(), &why, self.put);
             return Some(MavResult::MAV_RESULT_DENIED);
         }
-        if let Err(refusal) = self.ask_for(deed, height) {
-            say(self.client, deed.denied(), &refusal, self.put);
+        if let Err(refusal) = self.ask_for(goal, height) {
+            say(self.client, goal.denied(), &refusal, self.put);
             return Some(result(Err(refusal)));
         }
-        if deed.has_happened(&status) {
+        if goal.has_happened(&status) {
             return Some(MavResult::MAV_RESULT_ACCEPTED);
         }
         // The vehicle was asked; without room to wait, the program asks again and hears how it
         // stands.
-        let waits = self.orders.wait(self.now, asked, self.seat, Rise::Asked, self.cockpit);
+        let waits = self.orders.wait(self.now, asked, self.requester, Rise::Asked, self.access);
         (!waits).then_some(MavResult::MAV_RESULT_IN_PROGRESS)
     }
 
@@ -249,31 +251,31 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     }
 
     /// Asks the vehicle. Whatever else was asked of it, a mission included, is over then.
-    fn ask_for(&mut self, deed: Deed, height: f32) -> Result<(), Refusal> {
-        match deed {
-            Deed::TakeOff => self.cockpit.guide(self.now, self.seat, take_off(height))?,
-            Deed::Return => {
-                let down = self.cockpit.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
-                let home = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..deed.command() };
-                self.cockpit.fly_to(self.now, self.seat, home)?;
+    fn ask_for(&mut self, goal: CommandGoal, height: f32) -> Result<(), Refusal> {
+        match goal {
+            CommandGoal::TakeOff => self.access.guide(self.now, self.requester, take_off(height))?,
+            CommandGoal::Return => {
+                let down = self.access.view().estimate().map_or(0.0, |(_, estimate)| estimate.position.z);
+                let home = GuidedCommand { position: Vec3::new(0.0, 0.0, down), ..goal.command() };
+                self.access.fly_to(self.now, self.requester, home)?;
             }
-            _ => self.cockpit.guide(self.now, self.seat, deed.command())?,
+            _ => self.access.guide(self.now, self.requester, goal.command())?,
         }
-        match deed {
-            Deed::Arm => self.missions.runner.arms(self.now),
+        match goal {
+            CommandGoal::Arm => self.missions.runner.arms(self.now),
             _ => {
                 self.missions.runner.halt();
                 self.leading.stop();
             }
         }
-        if deed.ends_a_flight() {
+        if goal.ends_a_flight() {
             self.orders.end();
         }
         Ok(())
     }
 
     fn request(&mut self, request: Request) -> MavResult {
-        let asked = self.cockpit.request(self.now, request);
+        let asked = self.access.request(self.now, request);
         if let Err(refusal) = &asked {
             say(self.client, "denied", refusal, self.put);
         }
@@ -286,12 +288,12 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
             return MavResult::MAV_RESULT_DENIED;
         }
         // Takes the lease, or says who has it.
-        let asked = self.cockpit.guide(self.now, self.seat, GuidedCommand::default());
+        let asked = self.access.guide(self.now, self.requester, GuidedCommand::default());
         if let Err(refusal) = asked {
             self.not_started(&refusal);
             return result(asked);
         }
-        match self.missions.runner.start(self.now, self.seat, self.cockpit) {
+        match self.missions.runner.start(self.now, self.requester, self.access) {
             Ok(()) => {
                 self.leading.stop();
                 self.client.send(&self.missions.state(), self.put);
@@ -316,16 +318,18 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         let Some(flags) = flags else { return Some(MavResult::MAV_RESULT_DENIED) };
         let custom = flags.contains(MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED);
         match (whole(main), whole(sub)) {
-            (Some(4), Some(3)) if custom => self.does(number, Deed::Guided, 0.0),
+            (Some(4), Some(3)) if custom => self.does(number, CommandGoal::Guided, 0.0),
             (Some(4), Some(4)) if custom => Some(self.start_mission()),
-            (Some(4), Some(5)) if custom => self.does(number, Deed::Return, 0.0),
-            (Some(4), Some(6)) if custom => self.does(number, Deed::Land, 0.0),
+            (Some(4), Some(5)) if custom => self.does(number, CommandGoal::Return, 0.0),
+            (Some(4), Some(6)) if custom => self.does(number, CommandGoal::Land, 0.0),
             // Set-points are flown in no mode of their own; programs ask for one before they send
             // them.
-            (Some(6), _) if custom => self.does(number, Deed::Guided, 0.0),
+            (Some(6), _) if custom => self.does(number, CommandGoal::Guided, 0.0),
             _ if custom => self.no_such_mode(),
             _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED) => Some(self.start_mission()),
-            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => self.does(number, Deed::Guided, 0.0),
+            _ if flags.contains(MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED) => {
+                self.does(number, CommandGoal::Guided, 0.0)
+            }
             _ => self.no_such_mode(),
         }
     }
@@ -339,7 +343,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
     fn show(&mut self, id: u32) -> MavResult {
         let message = match id {
             MISSION_CURRENT_DATA::ID => Some(self.missions.state()),
-            _ => make(id, self.now, self.own, &self.cockpit.view()),
+            _ => make(id, self.now, self.own, &self.access.view()),
         };
         let Some(message) = message else { return MavResult::MAV_RESULT_UNSUPPORTED };
         self.client.send(&message, self.put);

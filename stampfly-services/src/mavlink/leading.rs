@@ -10,8 +10,8 @@
 //! A pilot who takes the sticks, a landing and the failsafe end it. The program has to fall silent
 //! before it may begin again: its stream must not take the vehicle back from the pilot.
 
-use crate::cockpit::Cockpit;
-use crate::refusal::{Refusal, Seat};
+use crate::access::VehicleAccess;
+use crate::refusal::{Refusal, Requester};
 use stampfly_types::messages::{
     CommandSource, FlightPhase, FlightStatus, GuidedCommand, GuidedKind, Setpoint, SetpointAxes,
 };
@@ -73,7 +73,7 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 struct Lead<C> {
     client: C,
-    seat: Seat,
+    requester: Requester,
     motion: Motion,
     /// The way-point, how fast it moves, and the heading there.
     place: Vec3,
@@ -100,8 +100,8 @@ pub(super) enum NotLed {
 }
 
 /// The path, of a vehicle that flies along one.
-fn path(cockpit: &dyn Cockpit) -> Result<Setpoint, NotLed> {
-    let (_, setpoint) = cockpit.view().setpoint().ok_or(NotLed::Refused(Refusal::Unsupported))?;
+fn path(access: &dyn VehicleAccess) -> Result<Setpoint, NotLed> {
+    let (_, setpoint) = access.view().setpoint().ok_or(NotLed::Refused(Refusal::Unsupported))?;
     let place = SetpointAxes::POSITION_XY | SetpointAxes::POSITION_Z;
     if setpoint.axes.contains(place) { Ok(setpoint) } else { Err(NotLed::Nowhere) }
 }
@@ -125,9 +125,9 @@ impl<C: Copy + PartialEq> Leading<C> {
         &mut self,
         now: Instant,
         client: C,
-        seat: Seat,
+        requester: Requester,
         motion: &Motion,
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
     ) -> Result<bool, NotLed> {
         let known = self.0.as_mut().filter(|lead| lead.client == client && now.since(lead.heard) < SILENCE);
         if let Some(lead) = known {
@@ -135,24 +135,25 @@ impl<C: Copy + PartialEq> Leading<C> {
             lead.yaw = motion.yaw.unwrap_or(lead.yaw);
             return if lead.stage == Stage::Over { Err(NotLed::NotFollowed) } else { Ok(false) };
         }
-        let path = path(cockpit)?;
+        let path = path(access)?;
         let (place, yaw) = (path.position, motion.yaw.unwrap_or(path.yaw));
         let (motion, stage) = (*motion, Stage::Begins);
         let velocity = path.velocity;
-        let mut lead = Lead { client, seat, motion, place, velocity, yaw, begun: now, heard: now, moved: now, stage };
-        lead.move_on(now, &path, cockpit).map_err(NotLed::Refused)?;
+        let mut lead =
+            Lead { client, requester, motion, place, velocity, yaw, begun: now, heard: now, moved: now, stage };
+        lead.move_on(now, &path, access).map_err(NotLed::Refused)?;
         self.0 = Some(lead);
         Ok(true)
     }
 
     /// Moves the way-point on. Call it about fifty times a second.
-    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+    pub fn poll(&mut self, now: Instant, access: &mut dyn VehicleAccess) {
         let Some(lead) = &mut self.0 else { return };
-        let is_followed = follows(&cockpit.view().state());
+        let is_followed = follows(&access.view().state());
         if now.since(lead.heard) >= SILENCE {
             if is_followed && lead.stage == Stage::Followed {
                 let hold = GuidedCommand { kind: GuidedKind::Hold, ..Default::default() };
-                _ = cockpit.guide(now, lead.seat, hold);
+                _ = access.guide(now, lead.requester, hold);
             }
             self.0 = None;
             return;
@@ -164,16 +165,16 @@ impl<C: Copy + PartialEq> Leading<C> {
             Stage::Begins | Stage::Followed => Stage::Over,
         };
         if lead.stage == Stage::Followed
-            && let Ok(path) = path(cockpit)
+            && let Ok(path) = path(access)
         {
             // What there is no room for is said with the next one.
-            _ = lead.move_on(now, &path, cockpit);
+            _ = lead.move_on(now, &path, access);
         }
     }
 }
 
 impl<C> Lead<C> {
-    fn move_on(&mut self, now: Instant, path: &Setpoint, cockpit: &mut dyn Cockpit) -> Result<(), Refusal> {
+    fn move_on(&mut self, now: Instant, path: &Setpoint, access: &mut dyn VehicleAccess) -> Result<(), Refusal> {
         let Motion { down, yaw_rate, .. } = self.motion;
         let dt = now.since(self.moved).seconds().min(LONGEST);
         let said = now.since(self.heard).seconds();
@@ -213,6 +214,6 @@ impl<C> Lead<C> {
         place.z = down.unwrap_or(place.z);
         let speed = (FASTER * velocity.norm()).max(path.velocity.norm()).max(SLOWEST);
         let way_point = GuidedCommand { position: place, yaw: self.yaw, speed, ..Default::default() };
-        cockpit.fly_to(now, self.seat, way_point)
+        access.fly_to(now, self.requester, way_point)
     }
 }

@@ -18,7 +18,7 @@ use super::identity::{Identity, Own};
 use super::item::Item;
 use super::said::Said;
 use super::streams::text;
-use crate::cockpit::Cockpit;
+use crate::access::VehicleAccess;
 use crate::mission::{Event, Runner, Step};
 use core::fmt::Write;
 use heapless::{String, Vec};
@@ -413,12 +413,12 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Missions<C, ITEMS> {
         now: Instant,
         own: &Own,
         clients: &mut [Client<C>],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
     ) {
         self.ask_again(now, clients, put);
         let items = &self.items;
-        let Some(event) = self.runner.poll(now, cockpit, &|place| Self::step(items, own, place)) else { return };
+        let Some(event) = self.runner.poll(now, access, &|place| Self::step(items, own, place)) else { return };
         let mut words = String::<50>::new();
         let told: Said = match event {
             Event::Reached(place) => MISSION_ITEM_REACHED_DATA { seq: place as u16 }.into(),

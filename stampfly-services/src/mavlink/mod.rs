@@ -53,8 +53,8 @@ mod targets;
 mod unreadable;
 mod unserved;
 
-use crate::cockpit::Cockpit;
-use crate::refusal::Seat;
+use crate::access::VehicleAccess;
+use crate::refusal::Requester;
 pub use answer::ends_a_flight;
 use calibration::Calibrating;
 use client::{Client, Fed, Guard, Put};
@@ -216,18 +216,18 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
     }
 
     /// A client is gone. What it commands it has left.
-    pub fn close(&mut self, client: C, cockpit: &mut dyn Cockpit) {
+    pub fn close(&mut self, client: C, access: &mut dyn VehicleAccess) {
         let gone = self.clients.iter().find(|known| known.id == client).and_then(|known| known.connection);
         if let Some(connection) = gone {
-            cockpit.leave(&|seat| seat.is_at(connection));
+            access.leave(&|requester| requester.is_at(connection));
         }
         self.missions.forget(client);
         self.clients.retain(|known| known.id != client);
     }
 
     /// Takes what a client has sent, and answers.
-    pub fn hear(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_tunnels(now, from, (bytes, false), cockpit, put, &mut |_, _| {});
+    pub fn hear(&mut self, now: Instant, from: C, bytes: &[u8], access: &mut dyn VehicleAccess, put: Put<'_, C>) {
+        self.hear_tunnels(now, from, (bytes, false), access, put, &mut |_, _| {});
     }
 
     /// The same, which hands every `TUNNEL` for this vehicle to `tunnel`, with who has sent it. The
@@ -237,17 +237,17 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         now: Instant,
         from: C,
         (bytes, is_late): (&[u8], bool),
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
-        tunnel: &mut dyn FnMut(Seat, Tunnel),
+        tunnel: &mut dyn FnMut(Requester, Tunnel),
     ) {
-        self.hear_any(now, from, (self.guard.is_some(), is_late), bytes, cockpit, put, tunnel);
+        self.hear_any(now, from, (self.guard.is_some(), is_late), bytes, access, put, tunnel);
     }
 
     /// Takes what a client on the same machine has sent, who need not sign although others must,
     /// and answers.
-    pub fn hear_local(&mut self, now: Instant, from: C, bytes: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_any(now, from, (false, false), bytes, cockpit, put, &mut |_, _| {});
+    pub fn hear_local(&mut self, now: Instant, from: C, bytes: &[u8], access: &mut dyn VehicleAccess, put: Put<'_, C>) {
+        self.hear_any(now, from, (false, false), bytes, access, put, &mut |_, _| {});
     }
 
     /// Takes what lay in the caller's queue for more than a second, of a client that need not sign
@@ -259,11 +259,11 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         from: C,
         is_local: bool,
         bytes: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
     ) {
         let guarded = !is_local && self.guard.is_some();
-        self.hear_any(now, from, (guarded, true), bytes, cockpit, put, &mut |_, _| {});
+        self.hear_any(now, from, (guarded, true), bytes, access, put, &mut |_, _| {});
     }
 
     // A client that is new has a guard, or need not sign. What is late is said of these bytes.
@@ -274,9 +274,9 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
         from: C,
         (guarded, is_late): (bool, bool),
         bytes: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
-        tunnel: &mut dyn FnMut(Seat, Tunnel),
+        tunnel: &mut dyn FnMut(Requester, Tunnel),
     ) {
         // A datagram holds whole frames. What begins otherwise is of no program that speaks
         // MAVLink, and takes no place of one that does.
@@ -287,13 +287,13 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             }
             self.admit(now, from, false, guarded);
         }
-        self.own.origin = cockpit.origin().or(self.own.origin);
+        self.own.origin = access.origin().or(self.own.origin);
         let Self { own, clients, missions, calibrating, orders, leading, guard, untrusted, .. } = self;
         let Some(client) = clients.iter_mut().find(|known| known.id == from) else { return };
         client.at(now, guard.as_ref());
         client.pulse.lies(is_late);
-        let connection = *client.connection.get_or_insert_with(|| cockpit.connection());
-        let seat = |[system, component]: [u8; 2]| Seat::Mavlink { connection, system, component };
+        let connection = *client.connection.get_or_insert_with(|| access.connection());
+        let requester = |[system, component]: [u8; 2]| Requester::Mavlink { connection, system, component };
         for byte in bytes {
             let (asker, said) = match client.feed(*byte, own.identity.system, guard.as_mut()) {
                 None | Some(Fed::Own) => continue,
@@ -304,7 +304,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                     // have said gets a heartbeat for it.
                     if why == Untrusted::Old
                         && !client.believed
-                        && let Some(heartbeat) = streams::make(HEARTBEAT, now, own, &cockpit.view())
+                        && let Some(heartbeat) = streams::make(HEARTBEAT, now, own, &access.view())
                         && client.may_be_told(now)
                     {
                         client.send(&heartbeat, put);
@@ -313,7 +313,7 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 }
                 Some(Fed::Tunnel(sender, heard)) => {
                     if own.is_meant(heard.target[0], heard.target[1]) {
-                        tunnel(seat(sender), heard);
+                        tunnel(requester(sender), heard);
                     }
                     continue;
                 }
@@ -329,8 +329,8 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
                 orders: &mut *orders,
                 leading: &mut *leading,
                 asker,
-                seat: seat(asker),
-                cockpit: &mut *cockpit,
+                requester: requester(asker),
+                access: &mut *access,
                 put: &mut *put,
             };
             match said {
@@ -354,13 +354,13 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
     }
 
     /// Sends what is due. Call it about fifty times a second.
-    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+    pub fn poll(&mut self, now: Instant, access: &mut dyn VehicleAccess, put: Put<'_, C>) {
         self.clients.retain(|client| client.stays || now.since(client.heard) < FORGOTTEN);
-        self.own.origin = cockpit.origin().or(self.own.origin);
-        let notices = self.notices.new_ones(&cockpit.view());
+        self.own.origin = access.origin().or(self.own.origin);
+        let notices = self.notices.new_ones(&access.view());
         let not_believed = self.not_believed(now);
         let mut asked = Vec::<Said, 4>::new();
-        while let Some((number, told)) = cockpit.told(self.asked).filter(|_| !asked.is_full()) {
+        while let Some((number, told)) = access.told(self.asked).filter(|_| !asked.is_full()) {
             self.asked = number;
             let mut words = heapless::String::<50>::new();
             _ = write!(words, "{told}");
@@ -381,13 +381,13 @@ impl<C: Copy + PartialEq, const N: usize, const ITEMS: usize> Mavlink<C, N, ITEM
             for said in not_believed.iter().chain(&mission).chain(&asked) {
                 client.send(said, put);
             }
-            client.send_due(now, &self.own, &cockpit.view(), put);
-            parameters::send_next(client, cockpit.parameters(), put);
+            client.send_due(now, &self.own, &access.view(), put);
+            parameters::send_next(client, access.parameters(), put);
         }
-        self.orders.poll(now, &mut self.clients, cockpit, &mut self.missions.runner, put);
-        self.leading.poll(now, cockpit);
-        self.missions.poll(now, &self.own, &mut self.clients, cockpit, put);
-        self.calibrating.poll(now, &mut self.clients, cockpit, put);
+        self.orders.poll(now, &mut self.clients, access, &mut self.missions.runner, put);
+        self.leading.poll(now, access);
+        self.missions.poll(now, &self.own, &mut self.clients, access, put);
+        self.calibrating.poll(now, &mut self.clients, access, put);
     }
 
     /// Says to those who are believed that others are not.

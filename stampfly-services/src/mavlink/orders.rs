@@ -1,16 +1,16 @@
 //! Commands that change the vehicle's state, each acknowledged when it is seen to have happened.
 //!
 //! What a program sends next depends on what the first command has done. So the acknowledgement waits
-//! until the [deed](crate::deed) is seen. Nothing is said meanwhile, because many programs take the
+//! until the [goal](crate::goal) is seen. Nothing is said meanwhile, because many programs take the
 //! first acknowledgement for the last one; a program that asks again meanwhile is told that it goes
 //! on, and the vehicle is not asked twice.
 
 use super::client::{Client, Put};
 use super::commands::acknowledge;
-use crate::cockpit::Cockpit;
-use crate::deed::{Deed, NOT_NOW, SOON, refusals, why_not};
+use crate::access::VehicleAccess;
+use crate::goal::{CommandGoal, NOT_NOW, SOON, refusals, why_not};
 use crate::mission::Runner;
-use crate::refusal::Seat;
+use crate::refusal::Requester;
 use core::fmt::{self, Write};
 use heapless::{String, Vec};
 use stampfly_link::mavlink::dialects::common::{MavResult, MavSeverity};
@@ -30,7 +30,7 @@ const UNKNOWN: u8 = u8::MAX;
 
 /// A take-off to this height, m.
 pub(super) fn take_off(height: f32) -> GuidedCommand {
-    GuidedCommand { position: Vec3::new(0.0, 0.0, -height), ..Deed::TakeOff.command() }
+    GuidedCommand { position: Vec3::new(0.0, 0.0, -height), ..CommandGoal::TakeOff.command() }
 }
 
 /// Who asks, over which connection, by which system and component and with which number of a
@@ -40,7 +40,7 @@ pub(super) struct Asked<C> {
     pub client: C,
     pub asker: [u8; 2],
     pub number: u16,
-    pub deed: Deed,
+    pub goal: CommandGoal,
 }
 
 /// Of a take-off: does it wait until the vehicle is armed?
@@ -58,7 +58,7 @@ pub(super) enum Rise {
 #[derive(Clone, Copy, Debug)]
 struct Order<C> {
     asked: Asked<C>,
-    seat: Seat,
+    requester: Requester,
     rise: Rise,
     since: Instant,
     /// How often it was told that it goes on.
@@ -100,7 +100,7 @@ impl<C: Copy + PartialEq> Orders<C> {
 
     /// Is the vehicle about to arm?
     pub fn is_arming(&self) -> bool {
-        self.all.iter().any(|order| order.asked.deed == Deed::Arm)
+        self.all.iter().any(|order| order.asked.goal == CommandGoal::Arm)
     }
 
     /// A command has come that ends flights: one that has not begun does not begin.
@@ -111,9 +111,16 @@ impl<C: Copy + PartialEq> Orders<C> {
     }
 
     /// Waits for it. `false` when there is no room.
-    pub fn wait(&mut self, now: Instant, asked: Asked<C>, seat: Seat, rise: Rise, cockpit: &dyn Cockpit) -> bool {
-        let refused = refusals(cockpit);
-        self.all.push(Order { asked, seat, rise, since: now, told: 0, refused }).is_ok()
+    pub fn wait(
+        &mut self,
+        now: Instant,
+        asked: Asked<C>,
+        requester: Requester,
+        rise: Rise,
+        access: &dyn VehicleAccess,
+    ) -> bool {
+        let refused = refusals(access);
+        self.all.push(Order { asked, requester, rise, since: now, told: 0, refused }).is_ok()
     }
 
     /// Looks what has happened, and acknowledges it. Call it about fifty times a second.
@@ -121,28 +128,28 @@ impl<C: Copy + PartialEq> Orders<C> {
         &mut self,
         now: Instant,
         clients: &mut [Client<C>],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         runner: &mut Runner,
         put: Put<'_, C>,
     ) {
         let is_arming = self.is_arming();
         self.all.retain_mut(|order| {
-            let Asked { client, asker, number, deed } = order.asked;
+            let Asked { client, asker, number, goal } = order.asked;
             // The program is gone.
             let Some(client) = clients.iter_mut().find(|known| known.id == client) else { return false };
-            let fate = order.look(now, is_arming, cockpit, runner);
+            let fate = order.look(now, is_arming, access, runner);
             let result = match fate {
                 Fate::Waits => return true,
                 Fate::GoesOn => MavResult::MAV_RESULT_IN_PROGRESS,
                 Fate::Done => MavResult::MAV_RESULT_ACCEPTED,
                 Fate::Denied(why) => {
-                    why.into_iter().for_each(|why| say(client, deed.denied(), &why, put));
+                    why.into_iter().for_each(|why| say(client, goal.denied(), &why, put));
                     MavResult::MAV_RESULT_DENIED
                 }
                 Fate::Failed => {
-                    let status = cockpit.view().state();
-                    let why = if deed == Deed::Arm { NOT_NOW } else { why_not(&status) };
-                    say(client, deed.denied(), &why, put);
+                    let status = access.view().state();
+                    let why = if goal == CommandGoal::Arm { NOT_NOW } else { why_not(&status) };
+                    say(client, goal.denied(), &why, put);
                     MavResult::MAV_RESULT_FAILED
                 }
             };
@@ -154,24 +161,24 @@ impl<C: Copy + PartialEq> Orders<C> {
 }
 
 impl<C> Order<C> {
-    fn look(&mut self, now: Instant, is_arming: bool, cockpit: &mut dyn Cockpit, runner: &mut Runner) -> Fate {
-        let (status, deed) = (cockpit.view().state(), self.asked.deed);
+    fn look(&mut self, now: Instant, is_arming: bool, access: &mut dyn VehicleAccess, runner: &mut Runner) -> Fate {
+        let (status, goal) = (access.view().state(), self.asked.goal);
         let waited = now.since(self.since);
         match self.rise {
             Rise::Asked => {}
-            Rise::Waits(height) if status.armed => return self.rise(now, height, cockpit, runner),
+            Rise::Waits(height) if status.armed => return self.rise(now, height, access, runner),
             Rise::Waits(_) if is_arming => return Fate::Waits,
             Rise::Waits(_) => return Fate::Denied(Some("motors are off")),
             Rise::Void => return Fate::Denied(Some("another command has ended it")),
         }
-        if deed.has_happened(&status) {
+        if goal.has_happened(&status) {
             return Fate::Done;
         }
-        if deed == Deed::Arm && refusals(cockpit) != self.refused {
+        if goal == CommandGoal::Arm && refusals(access) != self.refused {
             // Every station is told the reasons.
             return Fate::Denied(None);
         }
-        let lands = deed == Deed::Disarm && status.phase == FlightPhase::Landing;
+        let lands = goal == CommandGoal::Disarm && status.phase == FlightPhase::Landing;
         if waited >= if lands { LANDING } else { SOON } {
             return Fate::Failed;
         }
@@ -183,8 +190,8 @@ impl<C> Order<C> {
     }
 
     /// It is armed: asks for the take-off that has waited for it.
-    fn rise(&mut self, now: Instant, height: f32, cockpit: &mut dyn Cockpit, runner: &mut Runner) -> Fate {
-        if cockpit.guide(now, self.seat, take_off(height)).is_err() {
+    fn rise(&mut self, now: Instant, height: f32, access: &mut dyn VehicleAccess, runner: &mut Runner) -> Fate {
+        if access.guide(now, self.requester, take_off(height)).is_err() {
             return Fate::Denied(Some("the vehicle takes no command"));
         }
         runner.halt();

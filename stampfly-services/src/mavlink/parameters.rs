@@ -7,7 +7,7 @@
 use super::client::{Client, Put};
 use super::said::Said;
 use super::unserved::Unserved;
-use crate::cockpit::Cockpit;
+use crate::access::VehicleAccess;
 use core::fmt::Write;
 use heapless::String;
 use stampfly_link::mavlink::dialects::common::*;
@@ -125,11 +125,11 @@ pub(super) fn set<C>(
     client: &mut Client<C>,
     request: &PARAM_SET_DATA,
     asker: [u8; 2],
-    cockpit: &mut dyn Cockpit,
+    access: &mut dyn VehicleAccess,
     put: Put<'_, C>,
 ) {
-    let armed = cockpit.view().state().armed;
-    let parameters = cockpit.parameters();
+    let armed = access.view().state().armed;
+    let parameters = access.parameters();
     let Some(index) = find(parameters, &request.param_id.into()) else {
         return unknown(client, &request.param_id.into(), -1, asker, put);
     };

@@ -13,7 +13,7 @@
 use super::commands::Turn;
 use super::leading::{Motion, NotLed};
 use super::unserved::Unserved;
-use crate::deed::why_not;
+use crate::goal::why_not;
 use crate::refusal::Refusal;
 use stampfly_link::mavlink::dialects::common::*;
 use stampfly_types::messages::{FlightPhase, FlightStatus, GuidedCommand, StateEstimate};
@@ -40,11 +40,11 @@ pub(super) fn fly<C: Copy + PartialEq, const ITEMS: usize>(
     target: &SET_POSITION_TARGET_LOCAL_NED_DATA,
 ) {
     let mask = target.type_mask;
-    let status = turn.cockpit.view().state();
+    let status = turn.access.view().state();
     if status.phase != FlightPhase::Flying {
         return turn.client.complain(Unserved::Target, &grounded(&status), turn.put);
     }
-    let Some((_, estimate)) = turn.cockpit.view().estimate() else { return };
+    let Some((_, estimate)) = turn.access.view().estimate() else { return };
     let is_led = !mask.intersects(NO_VELOCITY)
         || !mask.intersects(NO_ACCELERATION)
         || !mask.contains(NO_HEIGHT | NO_CLIMB | NO_LIFT);
@@ -132,7 +132,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         if self.client.target == Some(new) && !self.missions.runner.is_running() {
             return;
         }
-        match self.cockpit.fly_to(self.now, self.seat, GuidedCommand { position, yaw, ..Default::default() }) {
+        match self.access.fly_to(self.now, self.requester, GuidedCommand { position, yaw, ..Default::default() }) {
             Ok(()) => {
                 self.client.target = Some(new);
                 self.missions.runner.halt();
@@ -173,7 +173,7 @@ impl<C: Copy + PartialEq, const ITEMS: usize> Turn<'_, '_, C, ITEMS> {
         let said = |keeps: bool, number: f32| (!keeps).then_some(number);
         let velocity = [said(keeps, velocity.x), said(keeps, velocity.y), said(keeps_climb, velocity.z)];
         let motion = Motion { velocity, acceleration: acceleration.to_array(), down, yaw, yaw_rate };
-        match self.leading.hear(self.now, self.client.id, self.seat, &motion, self.cockpit) {
+        match self.leading.hear(self.now, self.client.id, self.requester, &motion, self.access) {
             Ok(false) => {}
             Ok(true) => {
                 // The same place as before is a new target after this.

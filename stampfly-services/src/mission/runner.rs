@@ -4,9 +4,9 @@
 //! another program lands, the failsafe acts or whoever started the mission falls silent, it stops asking, and says why. It can be continued at the same step.
 
 use super::step::{Event, Halt, Step, Steps};
-use crate::cockpit::Cockpit;
+use crate::access::VehicleAccess;
 use crate::lease::SILENCE;
-use crate::refusal::{Refusal, Seat};
+use crate::refusal::{Refusal, Requester};
 use stampfly_types::messages::{CommandSource, FlightPhase, GuidedCommand, GuidedKind, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Vec3, frame};
 
@@ -54,7 +54,7 @@ pub struct Runner {
     reach: f32,
     current: usize,
     state: State,
-    seat: Seat,
+    requester: Requester,
     heard: Instant,
     speed: f32,
     /// When arming was asked for: programs start a mission before they can have seen that it worked.
@@ -73,7 +73,7 @@ impl Runner {
             reach,
             current: 0,
             state: State::Idle,
-            seat: Seat::Console,
+            requester: Requester::Console,
             heard: Instant::ZERO,
             speed: 0.0,
             arming: None,
@@ -118,8 +118,8 @@ impl Runner {
     ///
     /// # Errors
     /// When the motors are off, or a pilot flies.
-    pub fn start(&mut self, now: Instant, seat: Seat, cockpit: &dyn Cockpit) -> Result<(), Halt> {
-        let status = cockpit.view().state();
+    pub fn start(&mut self, now: Instant, requester: Requester, access: &dyn VehicleAccess) -> Result<(), Halt> {
+        let status = access.view().state();
         if !status.armed && !self.is_arming(now) {
             return Err(Halt::Disarmed);
         }
@@ -132,7 +132,7 @@ impl Runner {
         if self.is_finished() {
             self.current = 0;
         }
-        (self.seat, self.heard, self.routed) = (seat, now, false);
+        (self.requester, self.heard, self.routed) = (requester, now, false);
         if self.current == 0 {
             self.speed = 0.0;
         }
@@ -164,8 +164,8 @@ impl Runner {
     }
 
     /// A sign of life of whoever sits there.
-    pub fn alive(&mut self, now: Instant, seat: Seat) {
-        if seat == self.seat {
+    pub fn alive(&mut self, now: Instant, requester: Requester) {
+        if requester == self.requester {
             self.heard = now;
         }
     }
@@ -180,13 +180,13 @@ impl Runner {
     }
 
     /// Goes on. Call it about fifty times a second.
-    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, steps: Steps<'_>) -> Option<Event> {
+    pub fn poll(&mut self, now: Instant, access: &mut dyn VehicleAccess, steps: Steps<'_>) -> Option<Event> {
         let State::Runs(stage) = self.state else { return None };
         let Some(step) = steps(self.current) else {
             self.state = State::Finished;
             return Some(Event::Finished);
         };
-        let status = cockpit.view().state();
+        let status = access.view().state();
         let lands = matches!(stage, Stage::Landing(_));
         if lands && !status.armed {
             return self.done();
@@ -206,7 +206,7 @@ impl Runner {
         if let Some(why) = why {
             return self.halted(why);
         }
-        match self.advance(now, stage, step, cockpit) {
+        match self.advance(now, stage, step, access) {
             Ok(true) => self.done(),
             // Tried again with the next call.
             Ok(false) | Err(Refusal::Full) => None,
@@ -222,8 +222,14 @@ impl Runner {
     }
 
     /// Asks for what is next in a step. Is the step done?
-    fn advance(&mut self, now: Instant, stage: Stage, step: Step, cockpit: &mut dyn Cockpit) -> Result<bool, Refusal> {
-        let phase = cockpit.view().state().phase;
+    fn advance(
+        &mut self,
+        now: Instant,
+        stage: Stage,
+        step: Step,
+        access: &mut dyn VehicleAccess,
+    ) -> Result<bool, Refusal> {
+        let phase = access.view().state().phase;
         let flies = matches!(phase, FlightPhase::Flying | FlightPhase::Flip);
         let next = match (stage, step) {
             (Stage::Begin, Step::Speed(speed)) => {
@@ -238,7 +244,7 @@ impl Runner {
                 if phase == FlightPhase::Armed {
                     let position = Vec3::new(0.0, 0.0, -height);
                     let command = GuidedCommand { kind: GuidedKind::TakeOff, position, ..Default::default() };
-                    cockpit.guide(now, self.seat, command)?;
+                    access.guide(now, self.requester, command)?;
                 }
                 Stage::Rising(now)
             }
@@ -247,29 +253,29 @@ impl Runner {
             // The command may have been lost on its way through the queue.
             (Stage::Rising(since), _) if phase == FlightPhase::Armed && now.since(since) >= SEEN => Stage::Begin,
             (Stage::Begin, Step::GoTo { place, yaw, .. }) => {
-                self.go_to(now, place, yaw, stay(step), cockpit)?;
+                self.go_to(now, place, yaw, stay(step), access)?;
                 Stage::Going(place, None)
             }
             (Stage::Begin, Step::Land(Some([north, east]))) => {
-                let Some(estimate) = usable(cockpit) else { return Ok(false) };
+                let Some(estimate) = usable(access) else { return Ok(false) };
                 let place = Vec3::new(north, east, estimate.position.z);
-                self.go_to(now, place, None, Duration::ZERO, cockpit)?;
+                self.go_to(now, place, None, Duration::ZERO, access)?;
                 Stage::Going(place, None)
             }
-            (Stage::Begin, Step::Land(None)) => self.land(now, cockpit)?,
+            (Stage::Begin, Step::Land(None)) => self.land(now, access)?,
             (Stage::Going(place, since), _) => {
-                let Some(estimate) = usable(cockpit) else { return Ok(false) };
+                let Some(estimate) = usable(access) else { return Ok(false) };
                 let radius =
                     if let Step::GoTo { radius, .. } = step { radius.unwrap_or(self.reach) } else { self.reach };
                 let since = since.or(((estimate.position - place).norm() <= radius).then_some(now));
                 match (since, step) {
-                    (Some(_), Step::Land(_)) => self.land(now, cockpit)?,
+                    (Some(_), Step::Land(_)) => self.land(now, access)?,
                     (Some(_), Step::GoTo { stay: None, .. }) | (None, _) => Stage::Going(place, since),
                     (Some(there), _) if now.since(there) >= stay(step) => return Ok(true),
                     _ => Stage::Going(place, since),
                 }
             }
-            (Stage::Landing(since), _) if flies && now.since(since) >= SEEN => self.land(now, cockpit)?,
+            (Stage::Landing(since), _) if flies && now.since(since) >= SEEN => self.land(now, access)?,
             _ => return Ok(false),
         };
         self.state = State::Runs(next);
@@ -282,24 +288,24 @@ impl Runner {
         position: Vec3,
         yaw: Option<f32>,
         stay: Duration,
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
     ) -> Result<(), Refusal> {
-        let present = cockpit.view().estimate().map_or(0.0, |(_, estimate)| frame::yaw(&estimate.attitude));
+        let present = access.view().estimate().map_or(0.0, |(_, estimate)| frame::yaw(&estimate.attitude));
         let dwell = stay.seconds();
         let yaw = yaw.unwrap_or(present);
         let command = GuidedCommand { kind: GuidedKind::WayPoint, position, yaw, speed: self.speed, dwell };
         // What was asked before the mission is forgotten; then one follows the other without a halt.
         if self.routed {
-            cockpit.guide(now, self.seat, command)?;
+            access.guide(now, self.requester, command)?;
         } else {
-            cockpit.fly_to(now, self.seat, command)?;
+            access.fly_to(now, self.requester, command)?;
         }
         self.routed = true;
         Ok(())
     }
 
-    fn land(&mut self, now: Instant, cockpit: &mut dyn Cockpit) -> Result<Stage, Refusal> {
-        cockpit.guide(now, self.seat, GuidedCommand { kind: GuidedKind::Land, ..Default::default() })?;
+    fn land(&mut self, now: Instant, access: &mut dyn VehicleAccess) -> Result<Stage, Refusal> {
+        access.guide(now, self.requester, GuidedCommand { kind: GuidedKind::Land, ..Default::default() })?;
         self.routed = false;
         Ok(Stage::Landing(now))
     }
@@ -310,7 +316,7 @@ fn stay(step: Step) -> Duration {
 }
 
 /// The estimate, if its position may be used.
-fn usable(cockpit: &dyn Cockpit) -> Option<StateEstimate> {
+fn usable(access: &dyn VehicleAccess) -> Option<StateEstimate> {
     let position = Validity::POSITION_XY | Validity::POSITION_Z;
-    cockpit.view().estimate().map(|(_, estimate)| estimate).filter(|estimate| estimate.valid.contains(position))
+    access.view().estimate().map(|(_, estimate)| estimate).filter(|estimate| estimate.valid.contains(position))
 }

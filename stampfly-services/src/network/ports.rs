@@ -11,7 +11,7 @@
 
 use super::ends::{Client, Ends, Heard};
 use super::routes::Routes;
-use crate::cockpit::Cockpit;
+use crate::access::VehicleAccess;
 use crate::mavlink::{Identity, Mavlink};
 use core::net::SocketAddrV4;
 use stampfly_link::Address;
@@ -72,7 +72,7 @@ impl<const ITEMS: usize> Ports<ITEMS> {
     }
 
     /// MAVLink's turn: does what has come, and sends what is due. About a hundred times a second.
-    pub fn turn(&mut self, now: Instant, ends: &mut impl Ends, cockpit: &mut dyn Cockpit) {
+    pub fn turn(&mut self, now: Instant, ends: &mut impl Ends, access: &mut dyn VehicleAccess) {
         let Self { mavlink, next, stream } = self;
         let mut answers = Answers::default();
         ends.hear(&mut |client, heard| match heard {
@@ -81,10 +81,10 @@ impl<const ITEMS: usize> Ports<ITEMS> {
                 // Whoever has connected is told the vehicle's time before it signs.
                 mavlink.open(now, client, true);
             }
-            Heard::Bytes(bytes) => mavlink.hear(now, client, bytes, cockpit, &mut |to, frame| answers.put(*to, frame)),
+            Heard::Bytes(bytes) => mavlink.hear(now, client, bytes, access, &mut |to, frame| answers.put(*to, frame)),
             Heard::Closed => {
                 *stream = None;
-                mavlink.close(client, cockpit);
+                mavlink.close(client, access);
             }
         });
         answers.send(ends);
@@ -96,7 +96,7 @@ impl<const ITEMS: usize> Ports<ITEMS> {
         }
         if now >= *next {
             *next = now + PERIOD;
-            mavlink.poll(now, cockpit, &mut |to, frame| ends.send(*to, frame));
+            mavlink.poll(now, access, &mut |to, frame| ends.send(*to, frame));
         }
     }
 

@@ -1,7 +1,7 @@
 //! What takes its time: taking off, landing, moving, turning, turning over.
 
-use crate::cockpit::Cockpit;
-use crate::refusal::{Refusal, Seat};
+use crate::access::VehicleAccess;
+use crate::refusal::{Refusal, Requester};
 use crate::view::View;
 use stampfly_link::tello::{TelloAxis, TelloCommand, TelloDirection};
 use stampfly_types::messages::{FlightPhase, FlipDirection, GuidedCommand, GuidedKind, SetpointAxes};
@@ -86,14 +86,14 @@ impl Action {
     /// Begins it; `None` when it is done at once.
     pub fn begin(
         now: Instant,
-        seat: Seat,
+        requester: Requester,
         command: TelloCommand,
         speed: f32,
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
     ) -> Result<Option<Self>, &'static str> {
-        let status = cockpit.view().state();
+        let status = access.view().state();
         let flies = status.phase == FlightPhase::Flying;
-        let mut guide = |command| said(cockpit.guide(now, seat, command));
+        let mut guide = |command| said(access.guide(now, requester, command));
         let kind = match command {
             TelloCommand::TakeOff if status.armed => return Err("already in the air"),
             // A program that is used to a Tello knows of no calibration.
@@ -127,11 +127,11 @@ impl Action {
                     TelloDirection::Forward => Vec3::x(),
                     TelloDirection::Back => -Vec3::x(),
                 };
-                return fly(now, seat, along * distance, speed, cockpit).map(Some);
+                return fly(now, requester, along * distance, speed, access).map(Some);
             }
-            TelloCommand::Go { offset, speed } if flies => return fly(now, seat, offset, speed, cockpit).map(Some),
+            TelloCommand::Go { offset, speed } if flies => return fly(now, requester, offset, speed, access).map(Some),
             TelloCommand::Rotate { angle } if flies => {
-                let (place, heading) = base(&cockpit.view()).ok_or("no attitude")?;
+                let (place, heading) = base(&access.view()).ok_or("no attitude")?;
                 Kind::Turning { place, left: angle, goal: heading }
             }
             TelloCommand::Autotune { axis, .. } if flies => {
@@ -155,9 +155,9 @@ impl Action {
     }
 
     /// Looks how far it has come.
-    pub fn go_on(&mut self, now: Instant, seat: Seat, cockpit: &mut dyn Cockpit) -> Outcome {
-        let status = cockpit.view().state();
-        let Some((_, estimate)) = cockpit.view().estimate() else { return Outcome::GoesOn };
+    pub fn go_on(&mut self, now: Instant, requester: Requester, access: &mut dyn VehicleAccess) -> Outcome {
+        let status = access.view().state();
+        let Some((_, estimate)) = access.view().estimate() else { return Outcome::GoesOn };
         let age = now.since(self.begun);
         if age >= LONGEST {
             return Outcome::Failed("took too long");
@@ -171,7 +171,7 @@ impl Action {
         }
         match &mut self.kind {
             Kind::GettingReady if status.blocks.is_empty() => {
-                match said(cockpit.guide(now, seat, simple(GuidedKind::Arm))) {
+                match said(access.guide(now, requester, simple(GuidedKind::Arm))) {
                     Ok(()) => *self = Self { kind: Kind::Arming, begun: now },
                     Err(why) => return Outcome::Failed(why),
                 }
@@ -181,7 +181,7 @@ impl Action {
             Kind::Arming if status.armed => {
                 let position = Vec3::new(0.0, 0.0, -TAKE_OFF);
                 let rise = GuidedCommand { position, ..simple(GuidedKind::TakeOff) };
-                match said(cockpit.guide(now, seat, rise)) {
+                match said(access.guide(now, requester, rise)) {
                     Ok(()) => *self = Self { kind: Kind::Rising, begun: now },
                     Err(why) => return Outcome::Failed(why),
                 }
@@ -211,7 +211,7 @@ impl Action {
                 let part = left.clamp(-QUARTER, QUARTER);
                 (*goal, *left) = (math::wrap_angle(*goal + part), *left - part);
                 let turn = GuidedCommand { position: *place, yaw: *goal, ..Default::default() };
-                match said(cockpit.fly_to(now, seat, turn)) {
+                match said(access.fly_to(now, requester, turn)) {
                     Ok(()) => Outcome::GoesOn,
                     Err(why) => Outcome::Failed(why),
                 }
@@ -232,11 +232,17 @@ fn base(view: &View<'_>) -> Option<(Vec3, f32)> {
 }
 
 /// Begins a move, given as the vehicle looks.
-fn fly(now: Instant, seat: Seat, offset: Vec3, speed: f32, cockpit: &mut dyn Cockpit) -> Result<Action, &'static str> {
-    let (place, yaw) = base(&cockpit.view()).ok_or("no position")?;
+fn fly(
+    now: Instant,
+    requester: Requester,
+    offset: Vec3,
+    speed: f32,
+    access: &mut dyn VehicleAccess,
+) -> Result<Action, &'static str> {
+    let (place, yaw) = base(&access.view()).ok_or("no position")?;
     let goal = place + frame::from_yaw(yaw).transform_vector(&offset);
     let [low, high] = HEIGHTS;
     let goal = Vec3::new(goal.x, goal.y, goal.z.clamp(-high, -low));
-    said(cockpit.fly_to(now, seat, GuidedCommand { position: goal, yaw, speed, ..Default::default() }))?;
+    said(access.fly_to(now, requester, GuidedCommand { position: goal, yaw, speed, ..Default::default() }))?;
     Ok(Action { kind: Kind::Moving { goal }, begun: now })
 }

@@ -20,8 +20,8 @@ mod action;
 mod answers;
 mod burst;
 
-use crate::cockpit::Cockpit;
-use crate::refusal::{Connection, Seat};
+use crate::access::VehicleAccess;
+use crate::refusal::{Connection, Requester};
 use action::{Action, Outcome};
 use burst::Burst;
 use stampfly_link::tello::{TelloCommand, TelloReply, TelloState};
@@ -104,18 +104,25 @@ impl<C> Tello<C> {
 }
 
 impl<C: Copy + PartialEq> Tello<C> {
-    const fn seat(&self) -> Seat {
-        Seat::Tello(self.connection)
+    const fn requester(&self) -> Requester {
+        Requester::Tello(self.connection)
     }
 
     /// Takes a datagram.
-    pub fn hear(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_any(now, from, false, datagram, cockpit, put);
+    pub fn hear(&mut self, now: Instant, from: C, datagram: &[u8], access: &mut dyn VehicleAccess, put: Put<'_, C>) {
+        self.hear_any(now, from, false, datagram, access, put);
     }
 
     /// Takes a datagram that lay in the caller's queue for more than a second.
-    pub fn hear_late(&mut self, now: Instant, from: C, datagram: &[u8], cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        self.hear_any(now, from, true, datagram, cockpit, put);
+    pub fn hear_late(
+        &mut self,
+        now: Instant,
+        from: C,
+        datagram: &[u8],
+        access: &mut dyn VehicleAccess,
+        put: Put<'_, C>,
+    ) {
+        self.hear_any(now, from, true, datagram, access, put);
     }
 
     fn hear_any(
@@ -124,7 +131,7 @@ impl<C: Copy + PartialEq> Tello<C> {
         from: C,
         lay: bool,
         datagram: &[u8],
-        cockpit: &mut dyn Cockpit,
+        access: &mut dyn VehicleAccess,
         put: Put<'_, C>,
     ) {
         let mut say = |reply: TelloReply<'_>| send(&from, &reply, put);
@@ -139,7 +146,7 @@ impl<C: Copy + PartialEq> Tello<C> {
             if is_sticks {
                 // Those before it are as old. A stranger's are nothing.
                 return if is_program {
-                    self.let_go(now, cockpit)
+                    self.let_go(now, access)
                 };
             }
             return say(TelloReply::Error("expired"));
@@ -151,9 +158,9 @@ impl<C: Copy + PartialEq> Tello<C> {
             }
             if !is_program {
                 self.waits = None;
-                let before = self.seat();
-                cockpit.leave(&|seat| seat == before);
-                self.connection = cockpit.connection();
+                let before = self.requester();
+                access.leave(&|requester| requester == before);
+                self.connection = access.connection();
             }
             self.program = Some((from, now));
             self.burst = Burst::new(now);
@@ -163,21 +170,21 @@ impl<C: Copy + PartialEq> Tello<C> {
         if command == TelloCommand::Emergency {
             (self.action, self.waits) = (None, None);
             let killed =
-                cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
+                access.guide(now, self.requester(), GuidedCommand { kind: GuidedKind::Kill, ..Default::default() });
             return say(if killed.is_ok() { TelloReply::Ok } else { TelloReply::Error("not taken") });
         }
         if !is_program {
             return say(TelloReply::Error("say command first"));
         }
         self.program = Some((from, now));
-        cockpit.alive(now, self.seat());
+        access.alive(now, self.requester());
         match command {
             TelloCommand::KeepAlive => say(TelloReply::Ok),
             TelloCommand::Speed { speed } => {
                 self.speed = speed;
                 say(TelloReply::Ok);
             }
-            TelloCommand::Query(query) => say(answers::answer(query, self.speed, self.in_air, &cockpit.view())),
+            TelloCommand::Query(query) => say(answers::answer(query, self.speed, self.in_air, &access.view())),
             // Not answered, as a Tello does not.
             TelloCommand::Sticks { right, forward, up, clockwise } => {
                 let input = PilotInput {
@@ -186,7 +193,7 @@ impl<C: Copy + PartialEq> Tello<C> {
                     throttle: up,
                     yaw: clockwise,
                     mode: FlightMode::PosHold,
-                    arm: cockpit.view().state().armed,
+                    arm: access.view().state().armed,
                     kill: false,
                 };
                 let centred = input.roll == 0.0 && input.pitch == 0.0 && input.throttle == 0.0 && input.yaw == 0.0;
@@ -196,12 +203,19 @@ impl<C: Copy + PartialEq> Tello<C> {
                     self.sticks = Some((now, input));
                 }
             }
-            command => self.begin(now, &from, command, cockpit, put),
+            command => self.begin(now, &from, command, access, put),
         }
     }
 
     /// Begins what takes its time.
-    fn begin(&mut self, now: Instant, from: &C, command: TelloCommand, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
+    fn begin(
+        &mut self,
+        now: Instant,
+        from: &C,
+        command: TelloCommand,
+        access: &mut dyn VehicleAccess,
+        put: Put<'_, C>,
+    ) {
         let interrupts = matches!(command, TelloCommand::Stop | TelloCommand::Land);
         if self.action.is_some() || self.waits.is_some() {
             if !interrupts {
@@ -211,12 +225,12 @@ impl<C: Copy + PartialEq> Tello<C> {
             send(from, &TelloReply::Error("interrupted"), put);
         }
         if self.sticks.is_some() && !interrupts {
-            self.let_go(now, cockpit);
+            self.let_go(now, access);
             self.waits = Some((now, command));
             return;
         }
         self.sticks = None;
-        match Action::begin(now, self.seat(), command, self.speed, cockpit) {
+        match Action::begin(now, self.requester(), command, self.speed, access) {
             Ok(Some(action)) => self.action = Some(action),
             Ok(None) => send(from, &TelloReply::Ok, put),
             Err(why) => send(from, &TelloReply::Error(why), put),
@@ -224,8 +238,8 @@ impl<C: Copy + PartialEq> Tello<C> {
     }
 
     /// Goes on with what takes its time, and sends the state. Call it about fifty times a second.
-    pub fn poll(&mut self, now: Instant, cockpit: &mut dyn Cockpit, put: Put<'_, C>) {
-        let status = cockpit.view().state();
+    pub fn poll(&mut self, now: Instant, access: &mut dyn VehicleAccess, put: Put<'_, C>) {
+        let status = access.view().state();
         self.took_off = self.took_off.filter(|_| status.armed).or_else(|| status.armed.then_some(now));
         self.in_air = self.took_off.map_or(self.in_air, |took_off| now.since(took_off));
         let Some((program, heard)) = self.program else { return };
@@ -237,13 +251,13 @@ impl<C: Copy + PartialEq> Tello<C> {
             self.sticks = None;
             return;
         }
-        cockpit.alive(now, self.seat());
+        access.alive(now, self.requester());
         if let Some((_, command)) = self.waits.take_if(|(since, _)| now.since(*since) >= LETS_GO) {
-            self.begin(now, &program, command, cockpit, put);
+            self.begin(now, &program, command, access, put);
         }
-        let seat = self.seat();
+        let requester = self.requester();
         if let Some(action) = &mut self.action {
-            let outcome = action.go_on(now, seat, cockpit);
+            let outcome = action.go_on(now, requester, access);
             let reply = match outcome {
                 Outcome::GoesOn => None,
                 Outcome::Done => Some(TelloReply::Ok),
@@ -254,10 +268,10 @@ impl<C: Copy + PartialEq> Tello<C> {
                 send(&program, &reply, put);
             }
         }
-        self.fly_by_hand(now, cockpit);
+        self.fly_by_hand(now, access);
         if now >= self.next_state {
             self.next_state = now + STATE;
-            let state = answers::state(self.in_air, &cockpit.view());
+            let state = answers::state(self.in_air, &access.view());
             let mut line = [0; TelloState::LONGEST];
             if let Some(line) = state.write(&mut line).and_then(|length| line.get(..length)) {
                 put(&program, Destination::State, line);
@@ -266,21 +280,21 @@ impl<C: Copy + PartialEq> Tello<C> {
     }
 
     /// The vehicle holds its place under the program's command, if it was flown by sticks.
-    fn let_go(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+    fn let_go(&mut self, now: Instant, access: &mut dyn VehicleAccess) {
         if self.sticks.take().is_some() {
-            _ = cockpit.guide(now, self.seat(), GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
+            _ = access.guide(now, self.requester(), GuidedCommand { kind: GuidedKind::Hold, ..Default::default() });
         }
     }
 
     /// Passes on the sticks. When they stop coming, the vehicle holds its place under the program's command again.
-    fn fly_by_hand(&mut self, now: Instant, cockpit: &mut dyn Cockpit) {
+    fn fly_by_hand(&mut self, now: Instant, access: &mut dyn VehicleAccess) {
         let Some((at, input)) = self.sticks else { return };
         if now.since(at) < STICKS {
             let centred = PilotInput { mode: input.mode, ..PilotInput::default() };
             let input = if now.since(self.sticks_begun) > CENTRED { input } else { centred };
-            _ = cockpit.steer(now, self.seat(), &PilotInput { arm: cockpit.view().state().armed, ..input });
+            _ = access.steer(now, self.requester(), &PilotInput { arm: access.view().state().armed, ..input });
         } else {
-            self.let_go(now, cockpit);
+            self.let_go(now, access);
         }
     }
 }

@@ -8,7 +8,7 @@ use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWri
 use stampfly_link::secure::Payload;
 use stampfly_services::cable::{Assembly, BODY, Cable, Envelope, PART, PAUSE, Part, Split, TYPE, fingerprint};
 use stampfly_services::mavlink::Identity;
-use stampfly_services::{Asked, Cockpit, Seat, Told};
+use stampfly_services::{Asked, CommandNotice, Requester, VehicleAccess};
 use stampfly_types::messages::*;
 use stampfly_types::{Duration, Instant};
 
@@ -322,7 +322,7 @@ fn commands_are_acknowledged_or_refused_in_words_and_signs_of_life_are_its_own()
 #[test]
 fn a_station_is_told_once_what_others_ask() {
     let mut line = Line::new();
-    let told = |kind| Told { seat: Seat::Link(7), what: Asked::Command(kind) };
+    let told = |kind| CommandNotice { requester: Requester::Link(7), what: Asked::Command(kind) };
     line.vehicle.told.push(told(GuidedKind::Arm));
     line.turn();
     assert_eq!(line.heard(), [], "there is none yet");

@@ -6,7 +6,7 @@ use stampfly_flight::console::{self, CommandError, SensorLine};
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_flight::profile::Rows;
 use stampfly_param::{Conflict, ParameterError, ParameterInfo, Parameters};
-use stampfly_services::{Cockpit, Connection, Lease, Places, Refusal, Request, Seat, Told, View};
+use stampfly_services::{CommandNotice, Connection, Lease, Places, Refusal, Request, Requester, VehicleAccess, View};
 use stampfly_types::messages::{
     CommandSource, FlightPhase, FlightStatus, GuidedCommand, PilotInput, StateEstimate, Validity,
 };
@@ -127,9 +127,9 @@ pub struct Vehicle {
     pub parameters: Two,
     pub guided: Vec<GuidedCommand>,
     pub steered: Vec<PilotInput>,
-    pub alive: Vec<Seat>,
+    pub alive: Vec<Requester>,
     pub requests: Vec<Request>,
-    pub told: Vec<Told>,
+    pub told: Vec<CommandNotice>,
 }
 
 impl Vehicle {
@@ -182,12 +182,12 @@ impl Vehicle {
     }
 }
 
-impl Cockpit for Vehicle {
+impl VehicleAccess for Vehicle {
     fn view(&self) -> View<'_> {
         View::new(&self.newest, &self.places)
     }
-    fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal> {
-        self.lease.ask(now, seat, &command)?;
+    fn guide(&mut self, now: Instant, requester: Requester, command: GuidedCommand) -> Result<(), Refusal> {
+        self.lease.ask(now, requester, &command)?;
         self.guided.push(command);
         Ok(())
     }
@@ -195,20 +195,20 @@ impl Cockpit for Vehicle {
         self.connections += 1;
         self.connections
     }
-    fn told(&self, after: u32) -> Option<(u32, Told)> {
+    fn told(&self, after: u32) -> Option<(u32, CommandNotice)> {
         self.told.get(after as usize).map(|told| (after + 1, *told))
     }
-    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
+    fn leave(&mut self, has_left: &dyn Fn(Requester) -> bool) {
         self.lease.leave(has_left);
     }
-    fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
-        self.lease.steer(now, seat)?;
+    fn steer(&mut self, now: Instant, requester: Requester, input: &PilotInput) -> Result<(), Refusal> {
+        self.lease.steer(now, requester)?;
         self.steered.push(*input);
         Ok(())
     }
-    fn alive(&mut self, now: Instant, seat: Seat) {
-        self.lease.alive(now, seat);
-        self.alive.push(seat);
+    fn alive(&mut self, now: Instant, requester: Requester) {
+        self.lease.alive(now, requester);
+        self.alive.push(requester);
     }
     fn parameters(&mut self) -> &mut dyn Parameters {
         &mut self.parameters

@@ -1,10 +1,9 @@
 //! A vehicle's end of every conversation. One binary, because each would link the crate `mavlink` again:
 //! `cargo test -p stampfly-services --test services mission` runs one file.
 
+mod arbiter;
 mod cable;
 mod common;
-mod desk;
-mod helm;
 #[cfg(feature = "mavlink")]
 mod mavlink;
 #[cfg(feature = "mavlink")]
@@ -16,6 +15,7 @@ mod msp;
 mod network;
 #[cfg(feature = "mavlink")]
 mod orders;
+mod requests;
 mod streams;
 #[cfg(feature = "mavlink")]
 mod targets;

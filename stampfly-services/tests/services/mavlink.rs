@@ -6,7 +6,7 @@ use stampfly_link::mavlink::signing::{Signer, SigningKey};
 use stampfly_link::mavlink::{LONGEST, MavlinkDecoder, MavlinkVersion, MavlinkWriter};
 use stampfly_link::secure::Key;
 use stampfly_services::mavlink::{CLIENTS, Identity, Mavlink, short_name};
-use stampfly_services::{Asked, Request, Seat, Told};
+use stampfly_services::{Asked, CommandNotice, Request, Requester};
 use stampfly_types::messages::{
     Alerts, ArmBlocks, CalibrationKind, CalibrationReport, CalibrationStage, GuidedKind, SystemAlert,
 };
@@ -314,7 +314,7 @@ fn there_is_room_for_eight_clients_and_those_that_fall_silent_make_room() {
     }
     assert_eq!(mavlink.refused(), 1);
     assert_eq!(vehicle.alive.len(), CLIENTS);
-    assert!(matches!(vehicle.alive.first(), Some(Seat::Mavlink { .. })));
+    assert!(matches!(vehicle.alive.first(), Some(Requester::Mavlink { .. })));
     polled(&mut mavlink, &mut vehicle, 40_000, 40_020);
     let mut late = Station::new(99);
     late.asks(Instant::from_secs(41), &mut mavlink, &mut vehicle, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
@@ -537,14 +537,14 @@ fn every_station_is_told_what_was_done_and_by_whom_once() {
         texts.collect::<Vec<_>>()
     };
     assert_eq!(texts(&mut vehicle, 0), []);
-    let done = [(Seat::Page(3), GuidedKind::Arm), (Seat::Link(2), GuidedKind::Kill)];
-    vehicle.told.extend(done.map(|(seat, kind)| Told { seat, what: Asked::Command(kind) }));
+    let done = [(Requester::Page(3), GuidedKind::Arm), (Requester::Link(2), GuidedKind::Kill)];
+    vehicle.told.extend(done.map(|(requester, kind)| CommandNotice { requester, what: Asked::Command(kind) }));
     let wanted = ["page 3: arm", "the station with the key, line 2: KILL"];
     let mut heard = texts(&mut vehicle, 200);
     heard.sort_by_key(|(to, _)| *to);
     assert_eq!(heard, [1, 2].map(|to| wanted.map(|text| (to, text.to_owned()))).concat());
     assert_eq!(texts(&mut vehicle, 400), [], "once");
-    vehicle.told.push(Told { seat: Seat::Page(3), what: Asked::Left });
+    vehicle.told.push(CommandNotice { requester: Requester::Page(3), what: Asked::Left });
     assert_eq!(texts(&mut vehicle, 600).len(), 2);
 }
 

@@ -3,7 +3,7 @@
 use crate::common::{Id, Vehicle};
 use stampfly_link::BroadcastPacket;
 use stampfly_link::stream::{StreamEntry, StreamPacket, StreamStatus};
-use stampfly_services::{Cockpit as _, DataStream, Telemetry};
+use stampfly_services::{DataStream, Telemetry, VehicleAccess as _};
 use stampfly_types::messages::{FlowData, ImuData, MotorOutput, PowerData, StateEstimate};
 use stampfly_types::{Instant, Vec3};
 

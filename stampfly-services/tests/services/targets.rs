@@ -63,7 +63,7 @@ impl Scene {
 
     /// Lets so much time pass, ms, while a station says something twenty times a second.
     fn passes(&mut self, ms: u64, says: Option<&MavMessage>) {
-        use stampfly_services::Cockpit as _;
+        use stampfly_services::VehicleAccess as _;
         for _ in 0..(ms as f32 / CYCLE) as u64 {
             self.now += 1;
             if let Some(message) = says.filter(|_| self.now.is_multiple_of(20)) {

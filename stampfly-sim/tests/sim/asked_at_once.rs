@@ -5,7 +5,7 @@ use stampfly_bus::TopicInfo;
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_param::{Parameters, RequestedParameters};
 use stampfly_services::link::mavlink::dialects::common::MavType;
-use stampfly_services::{Hands, Refusal, Request};
+use stampfly_services::{Refusal, Request, VehicleActions};
 use stampfly_sim::fault::Injector;
 use stampfly_sim::ground::{About, Served, TURN};
 use stampfly_sim::vehicle::{Client, Heard, Link, Live, PortSpec, Ports};
@@ -47,7 +47,7 @@ impl Ports for Closed {
 /// A vehicle that accepts all commands and carries out none.
 struct Raft(RequestedParameters<Numbers, 8>);
 
-impl Hands for Raft {
+impl VehicleActions for Raft {
     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> {
         Ok(())
     }

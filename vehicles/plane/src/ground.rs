@@ -5,7 +5,7 @@ use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_fixed_wing::messages::Home;
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_param::{Parameters as ByNumber, RequestedParameters};
-use stampfly_services::{Hands, Refusal, Request};
+use stampfly_services::{Refusal, Request, VehicleActions};
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 use stampfly_types::{Instant, Origin};
 
@@ -29,7 +29,7 @@ impl<'b> Board<'b> {
     }
 }
 
-impl Hands for Board<'_> {
+impl VehicleActions for Board<'_> {
     fn command(&mut self, now: Instant, command: GuidedCommand) -> Result<(), Refusal> {
         self.ends.command_guided.publish(now, command).map(|_| ()).map_err(|_| Refusal::Full)
     }

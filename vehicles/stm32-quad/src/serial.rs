@@ -8,7 +8,7 @@ use crate::topics::{COUNT, LinkEnds, TOPICS};
 use stampfly_flight::newest::{NewestSamples, longest_message};
 use stampfly_param::{Parameters as ByNumber, RequestedParameters};
 use stampfly_services::msp::{Card, Misc, Msp, PidRow, PidTerm, Scale};
-use stampfly_services::{Hands, Helm, Places, Refusal, Request, Seated, View};
+use stampfly_services::{ArbitratedAccess, CommandArbiter, Places, Refusal, Request, VehicleActions, View};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
@@ -90,7 +90,7 @@ impl<'b> Board<'b> {
     }
 }
 
-impl Hands for Board<'_> {
+impl VehicleActions for Board<'_> {
     fn command(&mut self, _: Instant, _: GuidedCommand) -> Result<(), Refusal> {
         Err(Refusal::Unsupported)
     }
@@ -127,7 +127,7 @@ impl Hands for Board<'_> {
 
 /// The vehicle's end of the line.
 pub struct Serial<'b> {
-    helm: Helm,
+    arbiter: CommandArbiter,
     board: Board<'b>,
     places: Places,
 }
@@ -136,7 +136,7 @@ impl<'b> Serial<'b> {
     /// With these parameters and requests.
     #[must_use]
     pub fn new(board: Board<'b>) -> Self {
-        Self { helm: Helm::new(), board, places: Places::of(&TOPICS) }
+        Self { arbiter: CommandArbiter::new(), board, places: Places::of(&TOPICS) }
     }
 
     /// Bytes came in: answers them. Returns what the board has to do: keep the parameters, or bind.
@@ -148,8 +148,8 @@ impl<'b> Serial<'b> {
         newest: &Newest,
         put: &mut dyn FnMut(&[u8]),
     ) -> Option<Request> {
-        let Self { helm, board, places } = self;
-        msp.hear(now, bytes, &mut Seated { helm, hands: board, view: View::new(newest, places) }, put);
+        let Self { arbiter, board, places } = self;
+        msp.hear(now, bytes, &mut ArbitratedAccess { arbiter, actions: board, view: View::new(newest, places) }, put);
         self.poll(now, newest);
         self.board.asked.take()
     }
@@ -162,8 +162,8 @@ impl<'b> Serial<'b> {
 
     /// The parameters in use, whoever has changed them. Call it now and then.
     pub fn poll(&mut self, now: Instant, newest: &Newest) -> Parameters {
-        let Self { helm, board, places } = self;
-        helm.poll(now, View::new(newest, places).state().armed, board);
+        let Self { arbiter, board, places } = self;
+        arbiter.poll(now, View::new(newest, places).state().armed, board);
         *board.parameters.values()
     }
 }

@@ -12,7 +12,7 @@ mod storing;
 
 use crate::clock::Clock;
 use crate::facts::Facts;
-use crate::hands::{Hands, Later};
+use crate::actions::{VehicleActions, Later};
 #[cfg(feature = "hil")]
 use crate::hil;
 use crate::memory::{Memory, restart};
@@ -50,7 +50,7 @@ use stampfly_link::secure::Key;
 use stampfly_param::ChangeDetector;
 use stampfly_services::cable::{Cable, fingerprint};
 use stampfly_services::mavlink::Identity;
-use stampfly_services::{Helm, Places, RadioDesk, Seated, View};
+use stampfly_services::{CommandArbiter, Places, RadioRequests, ArbitratedAccess, View};
 use stampfly_types::messages::CalibrationReport;
 use static_cell::StaticCell;
 
@@ -94,9 +94,9 @@ pub struct Parts {
     /// The vehicle's key, if it has one yet.
     pub key: Option<Key>,
     pub link: &'static RefCell<Link<'static>>,
-    pub helm: &'static RefCell<Helm>,
+    pub arbiter: &'static RefCell<CommandArbiter>,
     /// What a station with the key asks by radio.
-    pub desk: &'static RefCell<RadioDesk>,
+    pub requests: &'static RefCell<RadioRequests>,
     /// The flight record.
     pub taken: &'static RefCell<Taken>,
     /// The network, and the time up to which signatures are reserved.
@@ -185,7 +185,7 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
     #[cfg(feature = "wifi")]
     let network = served::Served::new(parts.network);
     let Parts {
-        memory, health, profile, ends, storage, storage_ends, config, facts, key, link, helm, desk, taken, ..
+        memory, health, profile, ends, storage, storage_ends, config, facts, key, link, arbiter, requests, taken, ..
     } = *parts;
     let (detector, flown) = (ChangeDetector::new(config.clone()), (config.clone(), false));
     let cable = Cable::new(IDENTITY, fingerprint(&TOPICS, &config));
@@ -202,10 +202,10 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
         key,
         unstored_key: None,
         link,
-        desk,
+        requests,
         taken,
         cable,
-        helm,
+        arbiter,
         places: Places::of(&TOPICS),
         later: None,
         news: News::default(),
@@ -257,13 +257,13 @@ pub struct Console {
     unstored_key: Option<Key>,
     link: &'static RefCell<Link<'static>>,
     /// Questions of the station on the radio.
-    desk: &'static RefCell<RadioDesk>,
+    requests: &'static RefCell<RadioRequests>,
     /// The flight record.
     taken: &'static RefCell<Taken>,
     /// Everything that is spoken on the line.
     cable: Cable<{ TOPICS.len() }, ITEMS>,
     /// Who commands, here and by radio.
-    helm: &'static RefCell<Helm>,
+    arbiter: &'static RefCell<CommandArbiter>,
     places: Places,
     /// What a service has asked for.
     later: Option<Later>,
@@ -292,21 +292,21 @@ fn put(frames: &mut Vec<u8, FRAMES>, frame: &[u8]) {
 impl Console {
     /// Takes what has come, and makes the frames that are due. `text` is given what a person has typed.
     fn turn(&mut self, bytes: &[u8], text: &mut Vec<u8, 64>) {
-        let Self { known, link, ends, config, later, cable, helm, places, frames, .. } = self;
+        let Self { known, link, ends, config, later, cable, arbiter, places, frames, .. } = self;
         let now = Clock.now();
         let mut memory = known.memory.borrow_mut();
         memory.catch_up();
         let view = View::new(&memory.newest, places);
-        let hands = &mut Hands { link, ends, config, later };
-        let mut helm = helm.borrow_mut();
-        helm.poll(now, view.state().armed, hands);
-        let mut cockpit = Seated { helm: &mut helm, hands, view };
+        let actions = &mut VehicleActions { link, ends, config, later };
+        let mut arbiter = arbiter.borrow_mut();
+        arbiter.poll(now, view.state().armed, actions);
+        let mut access = ArbitratedAccess { arbiter: &mut arbiter, actions, view };
         let mut send = |frame: &[u8]| put(frames, frame);
-        cable.hear(now, bytes, &mut cockpit, &mut send, &mut |key| {
+        cable.hear(now, bytes, &mut access, &mut send, &mut |key| {
             let _ = text.push(key);
         });
         if bytes.is_empty() {
-            cable.poll(now, &mut cockpit, &memory.newest, &mut send);
+            cable.poll(now, &mut access, &memory.newest, &mut send);
         }
     }
 

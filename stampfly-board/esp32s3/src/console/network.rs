@@ -3,27 +3,27 @@
 use super::served::Served;
 use super::{Console, IDENTITY, newest_mode};
 use crate::clock::Clock;
-use crate::hands::Hands;
+use crate::actions::VehicleActions;
 use crate::wifi::Ports;
 use core::fmt::Write as _;
 use heapless::String;
 use stampfly_drivers::Timebase;
 use stampfly_services::association::{Credentials, USAGE, Wish};
-use stampfly_services::{Seated, View};
+use stampfly_services::{ArbitratedAccess, View};
 
 impl Console {
     /// Hears and answers programs in the network.
     #[inline(never)]
     pub(super) fn serve(&mut self) {
-        let Self { known, link, ends, config, later, helm, places, network: Served { network, ports, .. }, .. } = self;
+        let Self { known, link, ends, config, later, arbiter, places, network: Served { network, ports, .. }, .. } = self;
         let mut network = network.borrow_mut();
         let (Some(ports), Some(stack)) = (ports, &mut network.stack) else { return };
         let now = Clock.now();
         let mut memory = known.memory.borrow_mut();
         memory.catch_up();
         let view = View::new(&memory.newest, places);
-        let hands = &mut Hands { link, ends, config, later };
-        ports.turn(now, stack, &mut Seated { helm: &mut helm.borrow_mut(), hands, view });
+        let actions = &mut VehicleActions { link, ends, config, later };
+        ports.turn(now, stack, &mut ArbitratedAccess { arbiter: &mut arbiter.borrow_mut(), actions, view });
     }
 
     /// Reserves times of signatures, and opens the ports when there are some. Flash is written on a disarmed vehicle alone.

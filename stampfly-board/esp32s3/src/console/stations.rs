@@ -3,7 +3,7 @@
 use super::{Console, newest_mode, put};
 use crate::changes;
 use crate::clock::Clock;
-use crate::hands::Later;
+use crate::actions::Later;
 use crate::memory::restart;
 use crate::radio::POST;
 use crate::record::Line;
@@ -13,7 +13,7 @@ use stampfly_drivers::Timebase;
 use stampfly_flight::console::Request;
 use stampfly_flight::live::Change;
 use stampfly_services::cable::{BODY, PART, TUNNEL};
-use stampfly_services::desk::{Post, Room};
+use stampfly_services::requests::{Post, Room};
 
 /// Bytes of the frames of a chunk of the flight record.
 const CHUNK: usize = BODY.div_ceil(PART) * (TUNNEL + 32);
@@ -51,10 +51,10 @@ impl Console {
 
     /// Makes frames of it, as far as there is room for them.
     pub(super) fn make_record(&mut self) {
-        let Self { cable, desk, taken, frames, .. } = self;
+        let Self { cable, requests, taken, frames, .. } = self;
         let (mut taken, mut room, now) = (taken.borrow_mut(), [0; BODY], Clock.now());
         taken.ask(now, Line::Cable, cable.record());
-        taken.ask(now, Line::Radio, desk.borrow_mut().questions.record());
+        taken.ask(now, Line::Radio, requests.borrow_mut().questions.record());
         taken.poll(now);
         while frames.capacity() - frames.len() >= CHUNK
             && let Some(chunk) = taken.chunk(Line::Cable, &mut room, LEAST_CHUNK)
@@ -75,10 +75,10 @@ impl Console {
         }
         // The radio has sent those before.
         if POST.is_empty() {
-            let Self { known, config, desk, .. } = self;
+            let Self { known, config, requests, .. } = self;
             let answered = known.vehicle(config, |vehicle| {
                 let mut room = Room::default();
-                let answer = desk.borrow_mut().questions.answer(now, vehicle, &mut room)?;
+                let answer = requests.borrow_mut().questions.answer(now, vehicle, &mut room)?;
                 Some((Post::of(&answer.payload), answer.request))
             });
             if let Some((post, request)) = answered {
@@ -87,7 +87,7 @@ impl Console {
                 }
                 if request != Request::Nothing {
                     let said = self.carry_out(request, false).await;
-                    self.desk.borrow_mut().questions.report(&said);
+                    self.requests.borrow_mut().questions.report(&said);
                 }
             }
         }

@@ -16,7 +16,7 @@ pub use people::{Lamp, Spin};
 use super::faults::Wrong;
 use super::plant::PLANT;
 use super::sensing::{self, Healths, IMAGE, Others, Sensing, Shared};
-use super::terminal::{Desk, Terminal};
+use super::terminal::{StationRequests, Terminal};
 use crate::VehicleConfig;
 use crate::console::{Newest, Profile};
 use crate::golden;
@@ -33,7 +33,7 @@ use stampfly_flight::doctor::{Fact, FlashAccess, Restart};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_link::secure::{Guarded, MAX_FRAME, Policy};
 use stampfly_link::{Address, ControlPacket, Session};
-use stampfly_services::Helm;
+use stampfly_services::CommandArbiter;
 use stampfly_sim::plant::{Hand, Pose};
 use stampfly_sim::sensors::{ButtonModel, MotorModel};
 use stampfly_sim::time::{Clock, Tasks};
@@ -75,7 +75,7 @@ pub struct Bench<'b> {
     buzzer: Buzzer<Loudspeaker>,
     button: (ButtonModel, topics::ButtonContactTx<'b>),
     link: Link<'b>,
-    helm: Helm,
+    arbiter: CommandArbiter,
     /// What its transmitter sends; `None` while that is off.
     sticks: Option<PilotInput>,
     /// From where to where the hand moves, and when.
@@ -143,7 +143,7 @@ pub fn with_vehicle<T>(defect: Option<&Defect>, seed: u64, examine: impl FnOnce(
         buzzer: Buzzer::new(Loudspeaker::new(&clock, fault::is_silent(defect))),
         button: (button.0, button.1.button_contact),
         link: Link::new(Guarded::new(None, session, Policy { accept_unauthenticated: true }), link),
-        helm: Helm::new(),
+        arbiter: CommandArbiter::new(),
         sticks: None,
         hand: None,
         next: [clock.now(); 3],
@@ -221,7 +221,7 @@ impl Bench<'_> {
         if let Some(sticks) = self.sticks.and_then(|sticks| self.wiring.transmit(sticks)) {
             let mut bytes = ControlPacket::from_pilot(VEHICLE, &sticks).to_bytes();
             // What is refused is counted in the session.
-            let _ = self.link.receive(&mut self.helm, now, TRANSMITTER, &mut bytes);
+            let _ = self.link.receive(&mut self.arbiter, now, TRANSMITTER, &mut bytes);
         }
         for what in Outgoing::ALL {
             let _ = self.link.transmit(now, what, [0; 8], &mut [0; MAX_FRAME]);
@@ -247,7 +247,7 @@ impl Bench<'_> {
                 Fact { name, verdict, value, advice }
             })
             .collect();
-        let desk = Desk {
+        let requests = StationRequests {
             version: VERSION,
             newest: &self.newest,
             sensing: Sensing::Chips,
@@ -257,7 +257,7 @@ impl Bench<'_> {
             beside: None,
         };
         let ends = (&mut self.config, &mut self.console);
-        self.terminal.send(self.clock.now(), keys, &desk, ends, |_, _| "not on this bench");
+        self.terminal.send(self.clock.now(), keys, &requests, ends, |_, _| "not on this bench");
     }
 
     /// What the serial port has written since the last call.

@@ -8,7 +8,7 @@
 //! | `sealed.rs` | the secure link, as by the firmware in a Wi-Fi network |
 //! | `handling.rs` | what somebody does to it with their hands |
 //! | `configurator.rs` | what it is for programs that speak MSP |
-//! | `seats.rs` | what services may ask of the vehicle: its `Hands` |
+//! | `requesters.rs` | what services may ask of the vehicle: its `VehicleActions` |
 //!
 //! MAVLink, MSP and the page are the same for every vehicle: [`stampfly_sim::ground`].
 //!
@@ -18,8 +18,8 @@
 mod cable;
 mod configurator;
 mod handling;
+mod requesters;
 mod sealed;
-mod seats;
 mod services;
 
 pub(super) use handling::Handling;
@@ -35,8 +35,8 @@ use stampfly_flight::compact::Chunks;
 use stampfly_link::mavlink::dialects::common::MavType;
 use stampfly_link::secure::MAX_BODY;
 use stampfly_services::cable::BODY;
-use stampfly_services::tape::RADIO_CHUNK;
-use stampfly_services::{DataStream, Places, Tape, Telemetry, View, version};
+use stampfly_services::subscription::RADIO_CHUNK;
+use stampfly_services::{DataStream, Places, RecordSubscription, Telemetry, View, version};
 use stampfly_sim::ground::About;
 use stampfly_sim::vehicle::{Client, Guard, PortSpec, Speech, Transport};
 use stampfly_types::Instant;
@@ -110,7 +110,7 @@ pub(super) struct Seen {
     /// Parameters that have changed, for the moment when the vehicle is at rest and disarmed.
     pub changed: Waiting,
     /// Who is sent the flight record, and what of it waits to be sent.
-    pub tape: RefCell<Tape<Client>>,
+    pub subscription: RefCell<RecordSubscription<Client>>,
     pub chunks: RefCell<VecDeque<Vec<u8>>>,
     /// Somebody has asked for a restart.
     pub restarts: Cell<bool>,
@@ -126,7 +126,7 @@ impl Default for Seen {
             stream: RefCell::new(DataStream::new(count)),
             kept: RefCell::default(),
             changed: RefCell::default(),
-            tape: RefCell::new(Tape::new()),
+            subscription: RefCell::new(RecordSubscription::new()),
             chunks: RefCell::default(),
             restarts: Cell::new(false),
         }
@@ -141,14 +141,14 @@ const LEAST: usize = 256;
 impl Seen {
     /// Takes of the flight record what somebody wants of it.
     pub fn stream(&self, now: Instant, chunks: &mut dyn Chunks) {
-        let (mut tape, mut waiting) = (self.tape.borrow_mut(), self.chunks.borrow_mut());
-        tape.poll(now, chunks);
-        let Some(line) = tape.line() else { return waiting.clear() };
+        let (mut subscription, mut waiting) = (self.subscription.borrow_mut(), self.chunks.borrow_mut());
+        subscription.poll(now, chunks);
+        let Some(line) = subscription.line() else { return waiting.clear() };
         let (longest, least) = if line.port == SEALED { (MAX_BODY, RADIO_CHUNK) } else { (BODY, LEAST) };
         let mut room = [0; BODY];
         let Some(room) = room.get_mut(..longest) else { return };
         while waiting.len() < WAITING
-            && let Some(chunk) = tape.chunk(line, chunks, room, least)
+            && let Some(chunk) = subscription.chunk(line, chunks, room, least)
         {
             waiting.push_back(chunk.to_vec());
         }

@@ -1,24 +1,24 @@
 //! The simulated StampFly's secure link in a network: the firmware's [`Link`](crate::link::Link), with this machine's datagrams in place of a radio.
 //!
-//! A station with the key flies, asks and watches as on the vehicle's own Wi-Fi, and asks the same helm for the lease as programs at the other ports. Without a key
+//! A station with the key flies, asks and watches as on the vehicle's own Wi-Fi, and asks the same arbiter for the lease as programs at the other ports. Without a key
 //! the port is not there.
 
-use super::seats::{Board, Controls, obey};
+use super::requesters::{Board, Controls, obey};
 use super::{SEALED, Seen};
 use crate::VehicleConfig;
 use crate::link::Outgoing;
-use crate::simulation::terminal::{Desk, said};
+use crate::simulation::terminal::{StationRequests, said};
 use crate::topics::TOPICS;
 use core::hash::BuildHasher as _;
 use core::net::{SocketAddr, SocketAddrV4};
 use stampfly_flight::console::Request;
 use stampfly_link::Address;
 use stampfly_link::secure::{Key, MAX_FRAME, MIN_FRAME, Payload, Sample, Vehicle};
-use stampfly_services::RadioDesk;
+use stampfly_services::RadioRequests;
 use stampfly_services::cable::fingerprint;
-use stampfly_services::desk::{Answer, Room};
 use stampfly_services::network::Routes;
-use stampfly_services::radio_desk::NETWORK_SAMPLES;
+use stampfly_services::radio_requests::NETWORK_SAMPLES;
+use stampfly_services::requests::{Answer, Room};
 use stampfly_sim::vehicle::{Client, Put};
 use stampfly_types::Instant;
 use std::hash::RandomState;
@@ -31,21 +31,21 @@ const ANSWERS: usize = 2;
 /// The vehicle's end.
 pub(super) struct Sealed {
     routes: Routes,
-    desk: RadioDesk,
+    requests: RadioRequests,
 }
 
 impl Sealed {
     pub fn new(config: &VehicleConfig) -> Self {
-        Self { routes: Routes::new(), desk: RadioDesk::new(fingerprint(&TOPICS, config)) }
+        Self { routes: Routes::new(), requests: RadioRequests::new(fingerprint(&TOPICS, config)) }
     }
 
     /// Takes what has come.
     pub fn hear(&mut self, now: Instant, from: Client, bytes: &[u8], controls: &mut Controls<'_>, put: Put<'_>) {
-        let (helm, hands) = controls.helm();
-        if !hands.radio.is_open() {
+        let (arbiter, actions) = controls.arbiter();
+        if !actions.radio.is_open() {
             return;
         }
-        let (SocketAddr::V4(place), Some(link)) = (from.address, hands.radio.link()) else { return };
+        let (SocketAddr::V4(place), Some(link)) = (from.address, actions.radio.link()) else { return };
         let mut room = [0; MAX_FRAME];
         // Nothing is noted of those who ask for an offer: no number of them keeps a station out.
         if bytes.is_empty() {
@@ -55,19 +55,19 @@ impl Sealed {
         let source = self.routes.source(now, place, link.guarded.station());
         let Some(frame) = room.get_mut(..bytes.len()).filter(|frame| frame.len() >= MIN_FRAME) else { return };
         frame.copy_from_slice(bytes);
-        if let Ok(Some(received)) = link.receive_sealed(helm, now, source, frame) {
+        if let Ok(Some(received)) = link.receive_sealed(arbiter, now, source, frame) {
             // A station asks again for what there is no room for.
-            self.desk.ask(now, &received.payload);
+            self.requests.ask(now, &received.payload);
         }
     }
 
     /// Sends what is due. Call it every 20 ms.
-    pub fn poll(&mut self, now: Instant, controls: &mut Controls<'_>, desk: &Desk<'_>, put: Put<'_>) {
-        let (helm, hands) = controls.helm();
-        let Board { radio, console, config, seen, .. } = hands;
+    pub fn poll(&mut self, now: Instant, controls: &mut Controls<'_>, requests: &StationRequests<'_>, put: Put<'_>) {
+        let (arbiter, actions) = controls.arbiter();
+        let Board { radio, console, config, seen, .. } = actions;
         let is_open = radio.is_open();
         let Some(link) = radio.link() else { return };
-        let Self { routes, desk: asked } = self;
+        let Self { routes, requests: asked } = self;
         let mut send = |to: Address, frame: &[u8]| {
             // The vehicle does not know that nobody hears it.
             if !is_open {
@@ -86,7 +86,7 @@ impl Sealed {
                 send(to, frame);
             }
         }
-        if let Some((to, frame)) = link.notice(helm, now, &mut room) {
+        if let Some((to, frame)) = link.notice(arbiter, now, &mut room) {
             send(to, frame);
         }
         let station = link.guarded.station().and_then(|station| routes.place(station));
@@ -98,7 +98,7 @@ impl Sealed {
         };
         let mut answer = Room::default();
         for _ in 0..ANSWERS {
-            let next = desk.console(config, |vehicle| {
+            let next = requests.console(config, |vehicle| {
                 let Answer { payload, request, .. } = asked.questions.answer(now, vehicle, &mut answer)?;
                 say(&payload);
                 Some(request)
@@ -115,21 +115,21 @@ impl Sealed {
         }
         let mut words = [[0; 4]; Sample::MAX_WORDS];
         for _ in 0..NETWORK_SAMPLES {
-            let Some(payload) = asked.next(now, desk.newest, &mut words) else { break };
+            let Some(payload) = asked.next(now, requests.newest, &mut words) else { break };
             say(&payload);
         }
-        let Seen { tape, chunks, .. } = seen;
+        let Seen { subscription, chunks, .. } = seen;
         if let Some((wanted, station)) = asked.questions.record().zip(station) {
-            tape.borrow_mut().ask(now, station, wanted);
+            subscription.borrow_mut().ask(now, station, wanted);
         }
-        if station.is_some() && tape.borrow().line() == station {
+        if station.is_some() && subscription.borrow().line() == station {
             chunks.borrow_mut().drain(..).for_each(|chunk| say(&Payload::Chunk(&chunk)));
         }
     }
 
     /// From now on stations with this key are heard.
     pub fn open(key: [u8; 32], controls: &mut Controls<'_>) {
-        if let (Ok(key), Some(link)) = (Key::generate(KEY_ID, key), controls.hands.radio.link()) {
+        if let (Ok(key), Some(link)) = (Key::generate(KEY_ID, key), controls.actions.radio.link()) {
             link.guarded.set_vehicle(Vehicle::new(key));
         }
     }

@@ -2,14 +2,14 @@
 
 use super::cable::Cable;
 use super::handling::Handling;
+use super::requesters::{Board, Controls, obey};
 use super::sealed::Sealed;
-use super::seats::{Board, Controls, obey};
 use super::{ABOUT, CONSOLE, SEALED, STREAM, Seen, TELEMETRY, TELLO, TELLO_STATE, USB, USB_TCP};
 use crate::VehicleConfig;
 use crate::console::{Newest, Profile};
 use crate::simulation::radio::Radio;
 use crate::simulation::sensing::{Healths, Sensing};
-use crate::simulation::terminal::{Desk, Terminal};
+use crate::simulation::terminal::{StationRequests, Terminal};
 use crate::topics::ConsoleEnds;
 use stampfly_param::ChangeDetector;
 use stampfly_services::tello::Destination;
@@ -55,9 +55,9 @@ impl<'b> Services<'b> {
         (faults, world): (&Injector, &World),
         (seen, health, profile): (&'b Seen, &'b Healths, &'b Profile),
     ) -> Self {
-        let hands =
+        let actions =
             Board { radio, console, config: config.clone(), detector: ChangeDetector::new(config.clone()), seen };
-        let mut controls = Ground::new(&ABOUT, live, faults, hands);
+        let mut controls = Ground::new(&ABOUT, live, faults, actions);
         if let Some(signing) = live.ports.signing() {
             Sealed::open(signing.key, &mut controls);
         }
@@ -78,27 +78,27 @@ impl<'b> Services<'b> {
     }
 
     /// What every command line of the vehicle shares.
-    fn desk<'d>(&self, newest: &'d Newest) -> Desk<'d>
+    fn requests<'d>(&self, newest: &'d Newest) -> StationRequests<'d>
     where
         Self: 'd,
     {
         let Self { sensing, health, profile, ref handling, .. } = *self;
         let beside = Some(handling.clone());
-        Desk { version: VERSION, newest, sensing, health, profile, facts: &[], beside }
+        StationRequests { version: VERSION, newest, sensing, health, profile, facts: &[], beside }
     }
 
     /// A cable's turn: what has come over it, and whether it is late; or what is due.
     fn plug(&mut self, now: Instant, from: Client, bytes: Option<(&[u8], bool)>, put: Put<'_>) {
         let seen = self.seen;
         let newest = seen.newest.borrow();
-        let desk = self.desk(&newest);
+        let requests = self.requests(&newest);
         let Some((_, cable)) = self.cables.iter_mut().find(|(client, _)| *client == from) else { return };
         // One write a turn, however many frames.
         let mut sent = Vec::new();
         let mut send = |bytes: &[u8]| sent.extend_from_slice(bytes);
         match bytes {
-            Some(bytes) => cable.hear(now, bytes, &mut self.controls, &desk, &mut send),
-            None => cable.poll(now, from, &mut self.controls, &desk, &mut send),
+            Some(bytes) => cable.hear(now, bytes, &mut self.controls, &requests, &mut send),
+            None => cable.poll(now, from, &mut self.controls, &requests, &mut send),
         }
         if !sent.is_empty() {
             put(&from, &sent);
@@ -108,10 +108,10 @@ impl<'b> Services<'b> {
     fn type_in(&mut self, now: Instant, from: Client, keys: &[u8], put: Put<'_>) {
         let seen = self.seen;
         let newest = seen.newest.borrow();
-        let desk = self.desk(&newest);
+        let requests = self.requests(&newest);
         let Some((_, terminal)) = self.terminals.iter_mut().find(|(client, _)| *client == from) else { return };
-        let Board { config, console, .. } = &mut self.controls.hands;
-        terminal.send(now, keys, &desk, (config, console), |request, config| obey(request, seen, config));
+        let Board { config, console, .. } = &mut self.controls.actions;
+        terminal.send(now, keys, &requests, (config, console), |request, config| obey(request, seen, config));
         put(&from, core::mem::take(&mut terminal.screen).as_bytes());
     }
 }
@@ -122,13 +122,13 @@ impl Link for Services<'_> {
         match (from.port, heard) {
             (TELLO, Heard::Bytes(text) | Heard::Late(text)) => {
                 let tello_state = self.tello_state;
-                let mut cockpit = self.controls.seated(&*newest);
+                let mut access = self.controls.seated(&*newest);
                 let answer = &mut |to: &Client, what, bytes: &[u8]| {
                     destination(*to, what, tello_state).into_iter().for_each(|to| put(&to, bytes));
                 };
                 match heard {
-                    Heard::Late(_) => self.tello.hear_late(now, from, text, &mut cockpit, answer),
-                    _ => self.tello.hear(now, from, text, &mut cockpit, answer),
+                    Heard::Late(_) => self.tello.hear_late(now, from, text, &mut access, answer),
+                    _ => self.tello.hear(now, from, text, &mut access, answer),
                 }
             }
             (TELLO_STATE, Heard::Opened) => self.tello_state = Some(from.address.port()),
@@ -151,7 +151,7 @@ impl Link for Services<'_> {
                 terminal.into_iter().for_each(|(_, terminal)| terminal.expire());
             }
             (USB | USB_TCP, Heard::Opened) => {
-                let config = &self.controls.hands.config;
+                let config = &self.controls.actions.config;
                 self.cables.push((from, Cable::new(self.controls.identity(), config)));
             }
             (USB | USB_TCP, Heard::Bytes(bytes) | Heard::Late(bytes)) => {
@@ -162,7 +162,7 @@ impl Link for Services<'_> {
                 if let Some((_, cable)) = self.cables.iter_mut().find(|(client, _)| *client == from) {
                     cable.close(&mut self.controls.seated(&*newest));
                 }
-                self.seen.tape.borrow_mut().ask(now, from, false);
+                self.seen.subscription.borrow_mut().ask(now, from, false);
                 self.cables.retain(|(client, _)| *client != from);
             }
             // Frames have times of their own.
@@ -171,12 +171,12 @@ impl Link for Services<'_> {
             }
             (CONSOLE, Heard::Closed) => self.terminals.retain(|(client, _)| *client != from),
             (_, heard) => {
-                let (desk, seen) = (self.desk(&newest), self.seen);
+                let (requests, seen) = (self.requests(&newest), self.seen);
                 let console = &mut |Board { config, console, .. }: &mut Board<'_>, line: &str| {
                     let mut terminal = Terminal::new();
                     let keys = std::format!("{line}\r");
                     let board = |request: &_, config: &_| obey(request, seen, config);
-                    terminal.send(now, keys.as_bytes(), &desk, (config, console), board);
+                    terminal.send(now, keys.as_bytes(), &requests, (config, console), board);
                     // Without the echo and the prompt.
                     let screen = terminal.screen.strip_prefix(line).unwrap_or(&terminal.screen);
                     Ok(Reply::text(screen.trim_end_matches("> ").trim()))
@@ -213,12 +213,12 @@ impl Link for Services<'_> {
             return;
         }
         let newest = self.seen.newest.borrow();
-        let desk = self.desk(&newest);
-        self.sealed.poll(now, &mut self.controls, &desk, put);
+        let requests = self.requests(&newest);
+        self.sealed.poll(now, &mut self.controls, &requests, put);
         self.controls.answer(now, &*newest, put);
-        let mut cockpit = self.controls.seated(&*newest);
+        let mut access = self.controls.seated(&*newest);
         let tello_state = self.tello_state;
-        self.tello.poll(now, &mut cockpit, &mut |to, what, bytes| {
+        self.tello.poll(now, &mut access, &mut |to, what, bytes| {
             destination(*to, what, tello_state).into_iter().for_each(|to| put(&to, bytes));
         });
     }

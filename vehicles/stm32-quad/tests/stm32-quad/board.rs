@@ -3,7 +3,7 @@
 use stampfly_bus::{Band, Taps as _};
 use stampfly_flight::{Assembled, FlightLoop};
 use stampfly_param::parameters::set;
-use stampfly_services::{Hands, Refusal, Request};
+use stampfly_services::{Refusal, Request, VehicleActions};
 use stampfly_stm32_quad::Parameters;
 use stampfly_stm32_quad::parameters::RollGains;
 use stampfly_stm32_quad::schedule::Runnables;

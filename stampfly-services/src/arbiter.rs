@@ -1,14 +1,15 @@
-//! The part of a [`Cockpit`] that is the same for every vehicle: who commands, and what everybody
-//! is told of it.
+//! Decides which requester commands the vehicle, and reports every command to all of them.
 //!
-//! A vehicle implements [`Hands`]: how its commands and sticks are published, where its parameters
-//! are, what its board does. [`Seated`] is its cockpit for one call of a service, in firmware and
-//! in simulation alike. What comes by radio has no service: the vehicle's end of the radio asks the
-//! [`Helm`] itself, with [`Helm::guide`], [`Helm::steer`] and [`Helm::alive`].
+//! A vehicle implements [`VehicleActions`]: it publishes commands and sticks, gives access to its
+//! parameters, and carries out requests to its board. [`ArbitratedAccess`] combines these actions,
+//! the [`CommandArbiter`] and the vehicle's newest samples to the [`VehicleAccess`] of one call of a
+//! service, in firmware and in simulation alike. The vehicle's end of a radio, which is not a service,
+//! calls [`CommandArbiter::guide`], [`steer`](CommandArbiter::steer) and
+//! [`alive`](CommandArbiter::alive) directly.
 
-use crate::cockpit::{Cockpit, Request, fly_to};
+use crate::access::{Request, VehicleAccess, fly_to};
 use crate::lease::Lease;
-use crate::refusal::{Connection, Refusal, Seat};
+use crate::refusal::{Connection, Refusal, Requester};
 use crate::stick_source::{StickSource, Verdict};
 use crate::view::View;
 use core::fmt;
@@ -22,7 +23,7 @@ const AGAIN: Duration = Duration::from_secs(1);
 const TELLS: usize = 8;
 
 /// What a vehicle does for its services.
-pub trait Hands {
+pub trait VehicleActions {
     /// Publishes a command.
     ///
     /// # Errors
@@ -51,16 +52,16 @@ pub trait Hands {
     /// When it does not do that, or not with these numbers.
     fn request(&mut self, now: Instant, request: Request) -> Result<(), Refusal>;
 
-    /// Called with every [`Helm::poll`]: publishes what was changed of the parameters and may be in
+    /// Called with every [`CommandArbiter::poll`]: publishes what was changed of the parameters and may be in
     /// use now, takes over what others have changed. Nothing by default.
     fn poll(&mut self, _now: Instant, _armed: bool) {}
 }
 
 /// What was asked of the vehicle, and by whom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Told {
+pub struct CommandNotice {
     /// Who.
-    pub seat: Seat,
+    pub requester: Requester,
     /// What.
     pub what: Asked,
 }
@@ -78,14 +79,14 @@ pub enum Asked {
     Silent,
 }
 
-impl fmt::Display for Told {
+impl fmt::Display for CommandNotice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { seat, what } = self;
+        let Self { requester, what } = self;
         match what {
-            Asked::Command(kind) => write!(f, "{seat}: {}", word(*kind)),
-            Asked::Sticks => write!(f, "{seat}: flies by hand"),
-            Asked::Left => write!(f, "{seat} is gone, none commands"),
-            Asked::Silent => write!(f, "{seat} is silent, none commands"),
+            Asked::Command(kind) => write!(f, "{requester}: {}", word(*kind)),
+            Asked::Sticks => write!(f, "{requester}: flies by hand"),
+            Asked::Left => write!(f, "{requester} is gone, none commands"),
+            Asked::Silent => write!(f, "{requester} is silent, none commands"),
         }
     }
 }
@@ -105,7 +106,7 @@ const fn word(kind: GuidedKind) -> &'static str {
     }
 }
 
-/// What the helm passes on to the vehicle.
+/// What the arbiter passes on to the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Passed {
     /// A command.
@@ -119,21 +120,21 @@ pub type Pass<'p> = &'p mut dyn FnMut(Passed) -> Result<(), Refusal>;
 
 /// Who commands, and what everybody is told of it.
 #[derive(Clone, Debug, Default)]
-pub struct Helm {
+pub struct CommandArbiter {
     lease: Lease,
     sticks: StickSource,
     /// Who has the lease and was heard, when it was looked last.
-    heard: Option<Seat>,
+    heard: Option<Requester>,
     /// Connections that have come.
     connections: Connection,
-    tells: [Option<Told>; TELLS],
+    tells: [Option<CommandNotice>; TELLS],
     /// How many there have been.
     told: u32,
     /// When the newest one was asked last.
     asked: Instant,
 }
 
-impl Helm {
+impl CommandArbiter {
     /// No program commands.
     #[must_use]
     pub const fn new() -> Self {
@@ -150,36 +151,36 @@ impl Helm {
 
     /// Who commands.
     #[must_use]
-    pub fn holder(&self, now: Instant) -> Option<Seat> {
+    pub fn holder(&self, now: Instant) -> Option<Requester> {
         self.lease.holder(now)
     }
 
     /// Who has taken the lease of this flight and has not left, heard or not.
     #[must_use]
-    pub fn commander(&self) -> Option<Seat> {
+    pub fn commander(&self) -> Option<Requester> {
         self.lease.commander()
     }
 
     /// Who has taken the lease of this flight, heard or not, there or not.
     #[must_use]
-    pub const fn taker(&self) -> Option<Seat> {
+    pub const fn taker(&self) -> Option<Requester> {
         self.lease.taker()
     }
 
     /// Connections have ended. One that had the lease makes room, and everybody is told.
-    pub fn leave(&mut self, has_left: impl Fn(Seat) -> bool) {
+    pub fn leave(&mut self, has_left: impl Fn(Requester) -> bool) {
         let holder = self.lease.commander();
         self.lease.leave(has_left);
-        if let Some(seat) = holder.filter(|_| self.lease.commander().is_none()) {
-            self.tell(self.asked, Told { seat, what: Asked::Left });
+        if let Some(requester) = holder.filter(|_| self.lease.commander().is_none()) {
+            self.tell(self.asked, CommandNotice { requester, what: Asked::Left });
         }
     }
 
     /// What is to be done now and then, whichever programs are connected: call it at least every
     /// 100 ms.
-    pub fn poll(&mut self, now: Instant, armed: bool, hands: &mut dyn Hands) {
-        self.keep(now, armed, &mut |passed| pass(hands, now, passed));
-        hands.poll(now, armed);
+    pub fn poll(&mut self, now: Instant, armed: bool, actions: &mut dyn VehicleActions) {
+        self.keep(now, armed, &mut |passed| pass(actions, now, passed));
+        actions.poll(now, armed);
     }
 
     /// The part of [`poll`](Self::poll) that needs no hands: the lease ends with the flight, and the
@@ -198,11 +199,11 @@ impl Helm {
         }
         let holder = self.lease.holder(now);
         let before = core::mem::replace(&mut self.heard, holder);
-        // Not a seat that has left, or whose flight is over.
+        // Not a requester that has left, or whose flight is over.
         if holder.is_none()
-            && let Some(seat) = self.lease.commander().filter(|seat| before == Some(*seat))
+            && let Some(requester) = self.lease.commander().filter(|requester| before == Some(*requester))
         {
-            self.tell(now, Told { seat, what: Asked::Silent });
+            self.tell(now, CommandNotice { requester, what: Asked::Silent });
         }
     }
 
@@ -212,37 +213,43 @@ impl Helm {
         self.connections
     }
 
-    /// A command: is passed on, if this seat may give it.
+    /// A command: is passed on, if this requester may give it.
     ///
     /// # Errors
     /// When it may not, a number is none, or there is no room.
-    pub fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand, pass: Pass<'_>) -> Result<(), Refusal> {
-        self.lease.ask(now, seat, &command)?;
+    pub fn guide(
+        &mut self,
+        now: Instant,
+        requester: Requester,
+        command: GuidedCommand,
+        pass: Pass<'_>,
+    ) -> Result<(), Refusal> {
+        self.lease.ask(now, requester, &command)?;
         pass(Passed::Command(command))?;
         if command.kind != GuidedKind::None {
-            self.tell(now, Told { seat, what: Asked::Command(command.kind) });
+            self.tell(now, CommandNotice { requester, what: Asked::Command(command.kind) });
         }
         Ok(())
     }
 
-    /// A frame of sticks for a vehicle in this state: is passed on, if this seat may fly it by hand.
+    /// A frame of sticks for a vehicle in this state: is passed on, if this requester may fly it by hand.
     ///
     /// # Errors
-    /// When another may, or there is no room. A kill is passed on from every seat, and so is an arm
+    /// When another may, or there is no room. A kill is passed on from every requester, and so is an arm
     /// switch that is turned off, as a command to land.
     pub fn steer(
         &mut self,
         now: Instant,
-        seat: Seat,
+        requester: Requester,
         input: &PilotInput,
         status: &FlightStatus,
         pass: Pass<'_>,
     ) -> Result<(), Refusal> {
-        let verdict = self.sticks.judge(now, seat, input, status, &mut self.lease);
+        let verdict = self.sticks.judge(now, requester, input, status, &mut self.lease);
         if input.kill {
             pass(Passed::Sticks(input.cleaned()))?;
             if status.armed {
-                self.tell(now, Told { seat, what: Asked::Command(GuidedKind::Kill) });
+                self.tell(now, CommandNotice { requester, what: Asked::Command(GuidedKind::Kill) });
             }
             return Ok(());
         }
@@ -250,13 +257,13 @@ impl Helm {
             Verdict::Flies | Verdict::Passes => {
                 pass(Passed::Sticks(input.cleaned()))?;
                 if verdict == Verdict::Flies {
-                    self.tell(now, Told { seat, what: Asked::Sticks });
+                    self.tell(now, CommandNotice { requester, what: Asked::Sticks });
                 }
                 Ok(())
             }
             Verdict::Lands(holder) => {
                 let land = GuidedCommand { kind: GuidedKind::Land, ..GuidedCommand::default() };
-                self.guide(now, seat, land, pass)?;
+                self.guide(now, requester, land, pass)?;
                 Err(Refusal::Occupied(holder))
             }
             Verdict::Refused(holder) => Err(Refusal::Occupied(holder)),
@@ -264,12 +271,12 @@ impl Helm {
     }
 
     /// A sign of life. Does it count?
-    pub fn alive(&mut self, now: Instant, seat: Seat) -> bool {
-        self.lease.alive(now, seat);
-        self.lease.is_holders(seat)
+    pub fn alive(&mut self, now: Instant, requester: Requester) -> bool {
+        self.lease.alive(now, requester);
+        self.lease.is_holders(requester)
     }
 
-    fn tell(&mut self, now: Instant, told: Told) {
+    fn tell(&mut self, now: Instant, told: CommandNotice) {
         let newest = self.tells.get((self.told as usize).wrapping_sub(1) % TELLS).copied().flatten();
         let is_new = newest != Some(told) || now.since(self.asked) >= AGAIN;
         self.asked = now;
@@ -284,7 +291,7 @@ impl Helm {
     /// What was asked of the vehicle after this number, and by whom. What a service has not looked at
     /// for too long is gone.
     #[must_use]
-    pub fn told(&self, after: u32) -> Option<(u32, Told)> {
+    pub fn told(&self, after: u32) -> Option<(u32, CommandNotice)> {
         let waiting = self.told.wrapping_sub(after);
         if waiting == 0 {
             return None;
@@ -295,67 +302,67 @@ impl Helm {
     }
 }
 
-fn pass(hands: &mut dyn Hands, now: Instant, passed: Passed) -> Result<(), Refusal> {
+fn pass(actions: &mut dyn VehicleActions, now: Instant, passed: Passed) -> Result<(), Refusal> {
     match passed {
-        Passed::Command(command) => hands.command(now, command),
-        Passed::Sticks(input) => hands.sticks(now, &input),
+        Passed::Command(command) => actions.command(now, command),
+        Passed::Sticks(input) => actions.sticks(now, &input),
     }
 }
 
 /// The vehicle, for one call of a service.
-pub struct Seated<'s> {
+pub struct ArbitratedAccess<'s> {
     /// Who commands.
-    pub helm: &'s mut Helm,
+    pub arbiter: &'s mut CommandArbiter,
     /// What it does.
-    pub hands: &'s mut dyn Hands,
+    pub actions: &'s mut dyn VehicleActions,
     /// What it has published.
     pub view: View<'s>,
 }
 
-impl Cockpit for Seated<'_> {
+impl VehicleAccess for ArbitratedAccess<'_> {
     fn view(&self) -> View<'_> {
         self.view
     }
 
     fn connection(&mut self) -> Connection {
-        self.helm.connection()
+        self.arbiter.connection()
     }
 
-    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool) {
-        self.helm.leave(has_left);
+    fn leave(&mut self, has_left: &dyn Fn(Requester) -> bool) {
+        self.arbiter.leave(has_left);
     }
 
-    fn told(&self, after: u32) -> Option<(u32, Told)> {
-        self.helm.told(after)
+    fn told(&self, after: u32) -> Option<(u32, CommandNotice)> {
+        self.arbiter.told(after)
     }
 
-    fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal> {
-        let Self { helm, hands, .. } = self;
-        helm.guide(now, seat, command, &mut |passed| pass(*hands, now, passed))
+    fn guide(&mut self, now: Instant, requester: Requester, command: GuidedCommand) -> Result<(), Refusal> {
+        let Self { arbiter, actions, .. } = self;
+        arbiter.guide(now, requester, command, &mut |passed| pass(*actions, now, passed))
     }
 
-    fn fly_to(&mut self, now: Instant, seat: Seat, way_point: GuidedCommand) -> Result<(), Refusal> {
+    fn fly_to(&mut self, now: Instant, requester: Requester, way_point: GuidedCommand) -> Result<(), Refusal> {
         let [hold, way_point] = fly_to(way_point);
-        self.helm.lease.ask(now, seat, &way_point)?;
-        self.hands.command(now, hold)?;
-        self.guide(now, seat, way_point)
+        self.arbiter.lease.ask(now, requester, &way_point)?;
+        self.actions.command(now, hold)?;
+        self.guide(now, requester, way_point)
     }
 
-    fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal> {
-        let Self { helm, hands, view } = self;
-        helm.steer(now, seat, input, &view.state(), &mut |passed| pass(*hands, now, passed))
+    fn steer(&mut self, now: Instant, requester: Requester, input: &PilotInput) -> Result<(), Refusal> {
+        let Self { arbiter, actions, view } = self;
+        arbiter.steer(now, requester, input, &view.state(), &mut |passed| pass(*actions, now, passed))
     }
 
-    fn alive(&mut self, now: Instant, seat: Seat) {
-        self.helm.alive(now, seat);
+    fn alive(&mut self, now: Instant, requester: Requester) {
+        self.arbiter.alive(now, requester);
     }
 
     fn parameters(&mut self) -> &mut dyn Parameters {
-        self.hands.parameters()
+        self.actions.parameters()
     }
 
     fn origin(&self) -> Option<Origin> {
-        self.hands.origin()
+        self.actions.origin()
     }
 
     fn request(&mut self, now: Instant, request: Request) -> Result<(), Refusal> {
@@ -363,6 +370,6 @@ impl Cockpit for Seated<'_> {
         if !ends_something && self.view.state().armed {
             return Err(Refusal::Armed);
         }
-        self.hands.request(now, request)
+        self.actions.request(now, request)
     }
 }

@@ -6,7 +6,7 @@ use stampfly_flight::console::{self, CommandError, Request, SensorLine};
 use stampfly_flight::profile::Rows;
 use stampfly_link::secure::Payload;
 use stampfly_param::{ParameterError, ParameterInfo, Parameters};
-use stampfly_services::desk::{Answer, Desk, Room};
+use stampfly_services::requests::{Answer, Room, StationRequests};
 use stampfly_types::Instant;
 
 struct One(f32);
@@ -97,14 +97,14 @@ impl console::Vehicle for Board {
 
 /// A station as `connect` has it, whose frames of the vehicle with these places are lost.
 fn converse(board: &mut Board, line: &str, lost: &[usize], gap: bool) -> (String, bool) {
-    let (mut desk, mut had, mut frame) = (Desk::new(), String::new(), 0);
+    let (mut requests, mut had, mut frame) = (StationRequests::new(), String::new(), 0);
     for turn in 0..400 {
         if turn % 15 == 0 || gap && turn % 3 == 0 {
-            desk.ask(0, &Payload::Question { number: 9, from: had.len() as u16, line });
+            requests.ask(0, &Payload::Question { number: 9, from: had.len() as u16, line });
         }
         let mut room = Room::default();
         for _ in 0..2 {
-            let Some(Answer { payload, request, .. }) = desk.answer(Instant::ZERO, board, &mut room) else { break };
+            let Some(Answer { payload, request, .. }) = requests.answer(Instant::ZERO, board, &mut room) else { break };
             let Payload::Part { number: 9, from, text, last } = payload else { panic!("{payload:?}") };
             let is_lost = lost.contains(&frame);
             frame += 1;
@@ -115,7 +115,7 @@ fn converse(board: &mut Board, line: &str, lost: &[usize], gap: bool) -> (String
             }
             if request != Request::Nothing {
                 board.done += 1;
-                desk.report(&"saved");
+                requests.report(&"saved");
             }
             if end {
                 return (had, true);
@@ -149,17 +149,17 @@ fn a_text_before_a_request_that_is_too_long_to_be_kept_is_whole_or_has_no_end() 
 
 #[test]
 fn a_line_that_changes_a_parameter_is_done_once() {
-    let (mut desk, mut board, mut room) = (Desk::new(), board(), Room::default());
+    let (mut requests, mut board, mut room) = (StationRequests::new(), board(), Room::default());
     let line = Payload::Question { number: 9, from: 0, line: "param set gain 3" };
-    desk.ask(0, &line);
-    while desk.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
+    requests.ask(0, &line);
+    while requests.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
     assert_eq!(board.gain.0, 3.0);
     // The answer is lost, and a page writes a newer value meanwhile.
-    desk.ask(0, &Payload::WriteParameter { index: 0, value: 5.0 });
-    while desk.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
+    requests.ask(0, &Payload::WriteParameter { index: 0, value: 5.0 });
+    while requests.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
     assert_eq!(board.gain.0, 5.0);
-    desk.ask(0, &line);
-    while desk.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
+    requests.ask(0, &line);
+    while requests.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
     assert_eq!(board.gain.0, 5.0, "the older line was done again over the newer write");
 }
 
@@ -187,11 +187,11 @@ fn answers_of_every_length_and_loss_are_whole() {
 
 #[test]
 fn a_text_that_changes_between_two_parts_is_not_ended_within_a_character() {
-    let (mut desk, mut room) = (Desk::new(), Room::default());
+    let (mut requests, mut room) = (StationRequests::new(), Room::default());
     let mut board = Board { status: format!("9{}", "µ".repeat(200)), ..board() };
-    desk.ask(0, &Payload::Question { number: 9, from: 0, line: "status" });
+    requests.ask(0, &Payload::Question { number: 9, from: 0, line: "status" });
     let Some(Answer { payload: Payload::Part { text, last: false, .. }, .. }) =
-        desk.answer(Instant::ZERO, &mut board, &mut room)
+        requests.answer(Instant::ZERO, &mut board, &mut room)
     else {
         panic!()
     };
@@ -199,7 +199,7 @@ fn a_text_that_changes_between_two_parts_is_not_ended_within_a_character() {
     // One digit more.
     board.status = format!("10{}", "µ".repeat(200));
     let Some(Answer { payload: Payload::Part { text, last, .. }, .. }) =
-        desk.answer(Instant::ZERO, &mut board, &mut room)
+        requests.answer(Instant::ZERO, &mut board, &mut room)
     else {
         panic!()
     };
@@ -208,13 +208,13 @@ fn a_text_that_changes_between_two_parts_is_not_ended_within_a_character() {
 
 #[test]
 fn a_changed_line_under_the_same_number_is_not_answered_with_the_old_lines_answer() {
-    let (mut desk, mut board, mut room) = (Desk::new(), board(), Room::default());
-    desk.ask(0, &Payload::Question { number: 9, from: 0, line: "version" });
-    while desk.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
-    let taken = desk.ask(0, &Payload::Question { number: 9, from: 0, line: "param get gain" });
+    let (mut requests, mut board, mut room) = (StationRequests::new(), board(), Room::default());
+    requests.ask(0, &Payload::Question { number: 9, from: 0, line: "version" });
+    while requests.answer(Instant::ZERO, &mut board, &mut room).is_some() {}
+    let taken = requests.ask(0, &Payload::Question { number: 9, from: 0, line: "param get gain" });
     if taken {
         let Some(Answer { payload: Payload::Part { text, .. }, .. }) =
-            desk.answer(Instant::ZERO, &mut board, &mut room)
+            requests.answer(Instant::ZERO, &mut board, &mut room)
         else {
             panic!()
         };
@@ -226,15 +226,15 @@ fn a_changed_line_under_the_same_number_is_not_answered_with_the_old_lines_answe
 fn a_question_that_is_malicious_does_no_harm() {
     for from in [0, 1, 119, 120, 121, 1_000, u16::MAX - 1, u16::MAX] {
         for line in ["", "status", "accept", "long", "help", "param list", &"x".repeat(300)] {
-            let (mut desk, mut board, mut room) =
-                (Desk::new(), Board { status: "µ".repeat(40_000), ..board() }, Room::default());
+            let (mut requests, mut board, mut room) =
+                (StationRequests::new(), Board { status: "µ".repeat(40_000), ..board() }, Room::default());
             for number in [9, 9, 10] {
-                desk.ask(0, &Payload::Question { number, from, line });
+                requests.ask(0, &Payload::Question { number, from, line });
                 let mut count = 0;
-                while let Some(answer) = desk.answer(Instant::ZERO, &mut board, &mut room) {
+                while let Some(answer) = requests.answer(Instant::ZERO, &mut board, &mut room) {
                     count += 1;
                     if answer.request != Request::Nothing {
-                        desk.report(&"µ".repeat(100));
+                        requests.report(&"µ".repeat(100));
                     }
                     assert!(count < 2_000);
                 }

@@ -7,7 +7,7 @@ use stampfly_board::link::Link;
 use stampfly_board::topics::ConsoleEnds;
 use stampfly_flight::console::calibrate::Calibrate;
 use stampfly_param::Parameters;
-use stampfly_services::{Hands as Vehicle, Refusal, Request};
+use stampfly_services::{VehicleActions as Vehicle, Refusal, Request};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 
@@ -21,7 +21,7 @@ pub enum Later {
 }
 
 /// The vehicle, for one call of a service.
-pub struct Hands<'c> {
+pub struct VehicleActions<'c> {
     pub link: &'static RefCell<Link<'static>>,
     pub ends: &'c mut ConsoleEnds<'static>,
     /// The configuration of the next start.
@@ -30,7 +30,7 @@ pub struct Hands<'c> {
     pub later: &'c mut Option<Later>,
 }
 
-impl Vehicle for Hands<'_> {
+impl Vehicle for VehicleActions<'_> {
     fn command(&mut self, now: Instant, command: GuidedCommand) -> Result<(), Refusal> {
         self.link.borrow_mut().command(now, command).then_some(()).ok_or(Refusal::Full)
     }

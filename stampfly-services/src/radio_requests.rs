@@ -1,10 +1,12 @@
-//! What a station asks over the secure link besides flying: questions for a [`Desk`], and topics that it wants to see.
+//! Requests of one station over the secure link: [`StationRequests`], and the topics that it watches.
 //!
-//! The firmware's radio has one, for ESP-NOW and for datagrams in a network, and so has a simulated vehicle at its port of sealed frames. Not for a cable, on which
-//! envelopes carry a question's number and the tables' fingerprint: that is [`Cable`](crate::cable::Cable)'s. Here a station is told the fingerprint once a second while it asks
-//! for topics, and has to ask for them again every few seconds, because no radio says that somebody is gone.
+//! For ESP-NOW, for datagrams in a network, and for a simulated vehicle's port of sealed frames. A
+//! station gets the fingerprint of the tables once a second while it watches topics, and must renew
+//! its request every few seconds, because a radio does not report that a station has gone. For a
+//! cable use [`Cable`](crate::cable::Cable), whose envelopes carry the number of a question and the
+//! fingerprint.
 
-use crate::desk::Desk;
+use crate::requests::StationRequests;
 use crate::view::Samples;
 use crate::watches::Watches;
 use stampfly_link::secure::{Payload, Sample};
@@ -30,7 +32,7 @@ pub type Words = [[u8; 4]; Sample::MAX_WORDS];
 ///
 /// ```
 /// use stampfly_link::secure::{Payload, Sample};
-/// use stampfly_services::{RadioDesk, Samples};
+/// use stampfly_services::{RadioRequests, Samples};
 /// use stampfly_types::Instant;
 /// struct One;
 /// impl Samples for One {
@@ -38,18 +40,18 @@ pub type Words = [[u8; 4]; Sample::MAX_WORDS];
 ///         (topic == 7).then_some((Instant::from_millis(1), &[42]))
 ///     }
 /// }
-/// let (mut desk, now, mut room) = (RadioDesk::new(0xF1F5), Instant::from_secs(1), [[0; 4]; Sample::MAX_WORDS]);
-/// assert_eq!(desk.next(now, &One, &mut room), None);
-/// assert!(desk.ask(now, &Payload::Watch { topic: 7, period: 100 }));
-/// assert_eq!(desk.next(now, &One, &mut room), Some(Payload::Tables { fingerprint: 0xF1F5 }));
-/// let Some(Payload::Sample(sample)) = desk.next(now, &One, &mut room) else { panic!() };
+/// let (mut requests, now, mut room) = (RadioRequests::new(0xF1F5), Instant::from_secs(1), [[0; 4]; Sample::MAX_WORDS]);
+/// assert_eq!(requests.next(now, &One, &mut room), None);
+/// assert!(requests.ask(now, &Payload::Watch { topic: 7, period: 100 }));
+/// assert_eq!(requests.next(now, &One, &mut room), Some(Payload::Tables { fingerprint: 0xF1F5 }));
+/// let Some(Payload::Sample(sample)) = requests.next(now, &One, &mut room) else { panic!() };
 /// assert_eq!((sample.topic, sample.words().next()), (7, Some(42)));
-/// assert_eq!(desk.next(now, &One, &mut room), None);
+/// assert_eq!(requests.next(now, &One, &mut room), None);
 /// ```
 #[derive(Clone, Debug)]
-pub struct RadioDesk {
+pub struct RadioRequests {
     /// Its questions. Without numbers: an answer says what it answers.
-    pub questions: Desk,
+    pub questions: StationRequests,
     watches: Watches<WATCHED>,
     fingerprint: u16,
     /// When it has asked for a topic.
@@ -57,11 +59,17 @@ pub struct RadioDesk {
     tell_at: Instant,
 }
 
-impl RadioDesk {
+impl RadioRequests {
     /// Of a vehicle whose tables have this fingerprint.
     #[must_use]
     pub const fn new(fingerprint: u16) -> Self {
-        Self { questions: Desk::new(), watches: Watches::new(), fingerprint, asked: None, tell_at: Instant::ZERO }
+        Self {
+            questions: StationRequests::new(),
+            watches: Watches::new(),
+            fingerprint,
+            asked: None,
+            tell_at: Instant::ZERO,
+        }
     }
 
     /// Takes what is no command. `false` when it is none of what is answered here, or as many wait as there is room for.
@@ -117,12 +125,12 @@ mod tests {
         }
     }
 
-    fn sent(desk: &mut RadioDesk, now: Instant) -> Vec<Option<u16>> {
+    fn sent(requests: &mut RadioRequests, now: Instant) -> Vec<Option<u16>> {
         let table = Table(now, (0..100).collect());
         let mut room = [[0; 4]; Sample::MAX_WORDS];
         let mut all = Vec::new();
         for _ in 0..RADIO_SAMPLES {
-            match desk.next(now, &table, &mut room) {
+            match requests.next(now, &table, &mut room) {
                 Some(Payload::Tables { .. }) => all.push(None),
                 Some(Payload::Sample(sample)) => all.push(Some(sample.topic)),
                 _ => {}
@@ -133,13 +141,13 @@ mod tests {
 
     #[test]
     fn every_topic_has_its_turn_and_a_station_that_asks_no_more_is_sent_nothing() {
-        let mut desk = RadioDesk::new(1);
+        let mut requests = RadioRequests::new(1);
         for topic in 0..10 {
-            assert!(desk.ask(Instant::ZERO, &Payload::Watch { topic, period: 40 }));
+            assert!(requests.ask(Instant::ZERO, &Payload::Watch { topic, period: 40 }));
         }
         let (mut counts, mut tables) = ([0; 10], 0);
         for turn in 0..400 {
-            for what in sent(&mut desk, Instant::from_millis(20 * turn)) {
+            for what in sent(&mut requests, Instant::from_millis(20 * turn)) {
                 match what {
                     Some(topic) => counts[usize::from(topic)] += 1,
                     None => tables += 1,
@@ -153,11 +161,11 @@ mod tests {
 
     #[test]
     fn questions_are_the_desks() {
-        let mut desk = RadioDesk::new(1);
-        assert!(desk.ask(Instant::ZERO, &Payload::Record { wanted: true }));
-        assert_eq!(desk.questions.record(), Some(true));
-        assert!(!desk.ask(Instant::ZERO, &Payload::Kill));
-        assert!((0..WATCHED as u16).all(|topic| desk.ask(Instant::ZERO, &Payload::Watch { topic, period: 40 })));
-        assert!(!desk.ask(Instant::ZERO, &Payload::Watch { topic: 99, period: 40 }));
+        let mut requests = RadioRequests::new(1);
+        assert!(requests.ask(Instant::ZERO, &Payload::Record { wanted: true }));
+        assert_eq!(requests.questions.record(), Some(true));
+        assert!(!requests.ask(Instant::ZERO, &Payload::Kill));
+        assert!((0..WATCHED as u16).all(|topic| requests.ask(Instant::ZERO, &Payload::Watch { topic, period: 40 })));
+        assert!(!requests.ask(Instant::ZERO, &Payload::Watch { topic: 99, period: 40 }));
     }
 }

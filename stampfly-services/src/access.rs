@@ -1,13 +1,14 @@
-//! What a service sees of a vehicle, and what it may ask for.
+//! The interface between a service and a vehicle: newest samples, commands, parameters, requests.
 //!
-//! A vehicle implements [`Cockpit`] on a struct that borrows what is needed: where the newest
-//! samples are kept, the publishers of its commands, its parameters. Whether a command is obeyed is
-//! the mode machine's decision, and seen in the [`view`](Cockpit::view); a [`Refusal`] says that it
-//! did not even get there.
+//! A vehicle implements [`VehicleAccess`] on a struct that borrows its newest samples, the publishers
+//! of its commands and its parameters; [`ArbitratedAccess`](crate::ArbitratedAccess) is the
+//! implementation of all vehicles here. A [`Refusal`] means that a command did not reach the vehicle.
+//! A command that did may still be refused by the mode machine, which shows in the
+//! [`view`](VehicleAccess::view).
 
-use crate::helm::Told;
+use crate::arbiter::CommandNotice;
 use crate::lease::is_sane;
-use crate::refusal::{Connection, Refusal, Seat};
+use crate::refusal::{Connection, Refusal, Requester};
 use crate::view::View;
 use stampfly_param::Parameters;
 use stampfly_types::Instant;
@@ -48,7 +49,7 @@ pub(crate) fn fly_to(way_point: GuidedCommand) -> [GuidedCommand; 2] {
 }
 
 /// A vehicle, as services see it.
-pub trait Cockpit {
+pub trait VehicleAccess {
     /// What it has published.
     fn view(&self) -> View<'_>;
 
@@ -56,11 +57,11 @@ pub trait Cockpit {
     fn connection(&mut self) -> Connection;
 
     /// A connection has ended, or a page is gone: these do not sit there any more.
-    fn leave(&mut self, has_left: &dyn Fn(Seat) -> bool);
+    fn leave(&mut self, has_left: &dyn Fn(Requester) -> bool);
 
     /// What was asked of the vehicle after this number, and by whom: to be told to everybody. Begin
     /// with 0.
-    fn told(&self, _after: u32) -> Option<(u32, Told)> {
+    fn told(&self, _after: u32) -> Option<(u32, CommandNotice)> {
         None
     }
 
@@ -68,30 +69,30 @@ pub trait Cockpit {
     ///
     /// # Errors
     /// When it does not get to the mode machine.
-    fn guide(&mut self, now: Instant, seat: Seat, command: GuidedCommand) -> Result<(), Refusal>;
+    fn guide(&mut self, now: Instant, requester: Requester, command: GuidedCommand) -> Result<(), Refusal>;
 
     /// Forgets the route, and goes to a place.
     ///
     /// # Errors
     /// When it does not get to the mode machine.
-    fn fly_to(&mut self, now: Instant, seat: Seat, way_point: GuidedCommand) -> Result<(), Refusal> {
+    fn fly_to(&mut self, now: Instant, requester: Requester, way_point: GuidedCommand) -> Result<(), Refusal> {
         // A place that is none must not cost the route.
         if !is_sane(&way_point) {
             return Err(Refusal::Range);
         }
         let [hold, way_point] = fly_to(way_point);
-        self.guide(now, seat, hold)?;
-        self.guide(now, seat, way_point)
+        self.guide(now, requester, hold)?;
+        self.guide(now, requester, way_point)
     }
 
     /// Hands over a frame of sticks and switches, as a transmitter would.
     ///
     /// # Errors
     /// When another program commands.
-    fn steer(&mut self, now: Instant, seat: Seat, input: &PilotInput) -> Result<(), Refusal>;
+    fn steer(&mut self, now: Instant, requester: Requester, input: &PilotInput) -> Result<(), Refusal>;
 
     /// A sign of life of who sits there: what keeps the vehicle from taking its link for lost.
-    fn alive(&mut self, now: Instant, seat: Seat);
+    fn alive(&mut self, now: Instant, requester: Requester);
 
     /// Its parameters.
     fn parameters(&mut self) -> &mut dyn Parameters;

@@ -1,8 +1,10 @@
-//! What a station asks besides flying: parameters by their place, and lines of the console, each answered in turn.
+//! Requests of one station other than commands: parameters by number, lines of the console.
 //!
-//! The other end of [`Payload`]'s kinds 20, 21, 30, 31 and 41, for the radio and for a cable. Everything that waits has a bound, and an answer is made when there is room
-//! to send it: a long reply part by part. A radio loses parts: a [question](Payload::Question) that is said again is answered from where the station has not heard it, and not
-//! done again. Not for terminals, which have a [`LineEditor`](stampfly_flight::console::LineEditor).
+//! The vehicle's end of [`Payload`] kinds 20, 21, 30, 31 and 41, over the radio and over a cable. All
+//! queues are bounded. An answer is made when there is room to send it; a long reply is sent in
+//! parts. A radio loses parts: a repeated [question](Payload::Question) is answered from the first
+//! byte that the station has not received, and is not carried out again. For a terminal use a
+//! [`LineEditor`](stampfly_flight::console::LineEditor).
 
 use core::fmt;
 use heapless::{Deque, String};
@@ -75,13 +77,13 @@ pub struct Answer<'r, R> {
     pub number: u16,
     /// The answer.
     pub payload: Payload<'r>,
-    /// What only the board can do; it [reports](Desk::report) what came of it.
+    /// What only the board can do; it [reports](StationRequests::report) what came of it.
     pub request: Request<R>,
 }
 
 /// A payload that waits to be sent: on a radio, sealing and sending are one, so that no frame overtakes another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Post(Copied);
+pub struct QueuedPayload(Copied);
 
 #[derive(Clone, Debug, PartialEq)]
 enum Copied {
@@ -90,7 +92,7 @@ enum Copied {
     Part { number: u32, from: u16, text: String<PIECE>, last: bool },
 }
 
-impl Post {
+impl QueuedPayload {
     /// A copy of what a desk has answered. `None` of anything else.
     #[must_use]
     pub fn of(payload: &Payload<'_>) -> Option<Self> {
@@ -123,13 +125,13 @@ impl Post {
 /// Give it what is asked with [`ask`](Self::ask), and send what [`answer`](Self::answer) returns as long as there is room for more. `stampfly-board`'s tests have
 /// it on both ends of the air.
 #[derive(Clone, Debug, Default)]
-pub struct Desk {
+pub struct StationRequests {
     questions: Deque<(u16, Question), QUESTIONS>,
     line: Option<Line>,
     record: Option<bool>,
 }
 
-impl Desk {
+impl StationRequests {
     /// Nothing is asked.
     #[must_use]
     pub const fn new() -> Self {

@@ -9,7 +9,7 @@ use crate::topics::ConsoleEnds;
 use stampfly_flight::console;
 use stampfly_flight::console::calibrate::Calibrate;
 use stampfly_param::{ChangeDetector, Parameters};
-use stampfly_services::{Hands, Refusal, Request};
+use stampfly_services::{Refusal, Request, VehicleActions};
 use stampfly_sim::ground::Ground;
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
@@ -28,7 +28,7 @@ pub(super) struct Board<'b> {
     pub seen: &'b Seen,
 }
 
-impl Hands for Board<'_> {
+impl VehicleActions for Board<'_> {
     fn command(&mut self, _: Instant, command: GuidedCommand) -> Result<(), Refusal> {
         self.radio.command(command).then_some(()).ok_or(Refusal::Full)
     }

@@ -1,22 +1,22 @@
-//! What a command asks of a vehicle, and when it is seen to have happened.
+//! The goal of each command, and the vehicle state in which it is reached.
 //!
-//! A command that has reached the vehicle may still be refused by its mode machine. Services look
-//! at the [state](crate::View::state) that it publishes before they say that something is done:
-//! mostly one or two control cycles later.
+//! The mode machine may still refuse a command that has reached the vehicle. A service therefore
+//! acknowledges a command only when the published [state](crate::View::state) shows that its goal is
+//! reached, mostly one or two control cycles later.
 //!
-//! | asked for | has happened when |
+//! | command | reached when |
 //! |---|---|
-//! | arming | it is armed |
-//! | disarming, motors off | it is disarmed; in the air disarming lands first, and goes on meanwhile |
-//! | take-off | it rises or flies |
-//! | landing | it lands or is disarmed |
-//! | hold, return, another place, tuning | a program has authority, and it does not land |
-//! | guided mode | the same, or it is disarmed: then the next arming by a program is guided |
-//! | a flip | it turns over |
+//! | arming | armed |
+//! | disarming, motors off | disarmed; in the air disarming lands first, and continues meanwhile |
+//! | take-off | rising or flying |
+//! | landing | landing or disarmed |
+//! | hold, return, go to a place, tuning | a program has authority and the vehicle is not landing |
+//! | guided mode | the same, or disarmed: the next arming by a program is then guided |
+//! | flip | flipping |
 //!
-//! What has not happened after [`SOON`] has failed.
+//! A command whose goal is not reached after [`SOON`] has failed.
 
-use crate::cockpit::Cockpit;
+use crate::access::VehicleAccess;
 use core::fmt;
 use stampfly_types::messages::{
     ArmBlocks, CommandSource, FlightPhase, FlightStatus, FlipBlocks, GuidedCommand, GuidedKind,
@@ -39,7 +39,7 @@ pub(crate) const NOT_NOW: &str = "the vehicle does not do it now";
 /// What a command asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Deed {
+pub enum CommandGoal {
     /// That the motors may turn.
     Arm,
     /// That they may not; in the air, landing first.
@@ -67,7 +67,7 @@ pub enum Deed {
 /// A line of the table: the text of a denial, the command to the vehicle, and when it has happened.
 type Line = (&'static str, GuidedKind, fn(&FlightStatus) -> bool);
 
-impl Deed {
+impl CommandGoal {
     const fn line(self) -> Line {
         match self {
             Self::Arm => ("arming denied", GuidedKind::Arm, |now| now.armed),
@@ -150,7 +150,7 @@ fn is_led(status: &FlightStatus) -> bool {
     status.armed && !lands && status.commander == CommandSource::Guided
 }
 
-impl Deed {
+impl CommandGoal {
     /// Says why a vehicle in this state does not do it, as far as that is known before it is asked.
     /// `false` when nothing speaks against it.
     pub fn refuse(self, status: &FlightStatus, words: &mut dyn fmt::Write) -> bool {
@@ -195,7 +195,7 @@ fn list<'a>(reasons: impl Iterator<Item = &'a str>, words: &mut dyn fmt::Write) 
 /// One that was asked for, until it is seen to have happened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waited {
-    deed: Deed,
+    goal: CommandGoal,
     since: Instant,
     /// Refusals to arm that there were before.
     refused: u32,
@@ -204,14 +204,14 @@ pub struct Waited {
 impl Waited {
     /// The vehicle is asked for it now.
     #[must_use]
-    pub fn new(now: Instant, deed: Deed, cockpit: &dyn Cockpit) -> Self {
-        Self::with(now, deed, refusals(cockpit))
+    pub fn new(now: Instant, goal: CommandGoal, access: &dyn VehicleAccess) -> Self {
+        Self::with(now, goal, refusals(access))
     }
 
-    /// The same for who has no cockpit: the vehicle has refused to arm so many times.
+    /// The same for who has no access: the vehicle has refused to arm so many times.
     #[must_use]
-    pub const fn with(now: Instant, deed: Deed, refusals: u32) -> Self {
-        Self { deed, since: now, refused: refusals }
+    pub const fn with(now: Instant, goal: CommandGoal, refusals: u32) -> Self {
+        Self { goal, since: now, refused: refusals }
     }
 
     /// When it was asked for.
@@ -222,30 +222,30 @@ impl Waited {
 
     /// What has become of it: done, or why not. `None` while neither is seen.
     #[must_use]
-    pub fn look(&self, now: Instant, cockpit: &dyn Cockpit) -> Option<Result<(), &'static str>> {
-        self.look_at(now, &cockpit.view().state(), refusals(cockpit))
+    pub fn look(&self, now: Instant, access: &dyn VehicleAccess) -> Option<Result<(), &'static str>> {
+        self.look_at(now, &access.view().state(), refusals(access))
     }
 
-    /// The same for who has no cockpit: the vehicle is in this state, and has refused to arm so
+    /// The same for who has no access: the vehicle is in this state, and has refused to arm so
     /// many times.
     #[must_use]
     pub fn look_at(&self, now: Instant, status: &FlightStatus, refusals: u32) -> Option<Result<(), &'static str>> {
-        let lands = self.deed == Deed::Disarm && status.phase == FlightPhase::Landing;
-        if lands || self.deed.has_happened(status) {
+        let lands = self.goal == CommandGoal::Disarm && status.phase == FlightPhase::Landing;
+        if lands || self.goal.has_happened(status) {
             return Some(Ok(()));
         }
         // A vehicle that turns over remembers it, and lands as soon as it is level.
-        if self.deed.ends_a_flight() && status.phase == FlightPhase::Flip {
+        if self.goal.ends_a_flight() && status.phase == FlightPhase::Flip {
             return None;
         }
-        let is_refused = self.deed == Deed::Arm && refusals != self.refused;
+        let is_refused = self.goal == CommandGoal::Arm && refusals != self.refused;
         (is_refused || now.since(self.since) >= SOON).then(|| Err(why_not(status)))
     }
 }
 
 /// Refusals to arm so far.
-pub(crate) fn refusals(cockpit: &dyn Cockpit) -> u32 {
-    cockpit.view().refusals().map_or(0, |(_, refusals)| refusals.attempts)
+pub(crate) fn refusals(access: &dyn VehicleAccess) -> u32 {
+    access.view().refusals().map_or(0, |(_, refusals)| refusals.attempts)
 }
 
 /// Why a vehicle in this state does not do something, as far as its state says so.

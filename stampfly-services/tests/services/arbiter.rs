@@ -1,18 +1,18 @@
 //! Who commands: pages, programs, stations with the key and transmitters under one rule.
 
-use stampfly_services::{Asked, Helm, Passed, Refusal, Seat, Told};
+use stampfly_services::{Asked, CommandArbiter, CommandNotice, Passed, Refusal, Requester};
 use stampfly_types::Instant;
 use stampfly_types::messages::{CommandSource, FlightMode, FlightStatus, GuidedCommand, GuidedKind, PilotInput};
 
-const PAGE: Seat = Seat::Page(1);
-const STATION: Seat = Seat::Link(2);
-const OTHER_STATION: Seat = Seat::Link(3);
-const PROGRAM: Seat = Seat::Mavlink { connection: 4, system: 255, component: 190 };
+const PAGE: Requester = Requester::Page(1);
+const STATION: Requester = Requester::Link(2);
+const OTHER_STATION: Requester = Requester::Link(3);
+const PROGRAM: Requester = Requester::Mavlink { connection: 4, system: 255, component: 190 };
 
-/// A helm, and what it has passed on.
+/// A arbiter, and what it has passed on.
 #[derive(Default)]
 struct Scene {
-    helm: Helm,
+    arbiter: CommandArbiter,
     now: Instant,
     status: FlightStatus,
     passed: Vec<Passed>,
@@ -21,39 +21,39 @@ struct Scene {
 
 impl Scene {
     /// A vehicle that a program leads.
-    fn led_by(seat: Seat) -> Self {
+    fn led_by(requester: Requester) -> Self {
         let mut scene = Self::default();
-        assert_eq!(scene.guide(seat, GuidedKind::Arm), Ok(()));
+        assert_eq!(scene.guide(requester, GuidedKind::Arm), Ok(()));
         scene.status = FlightStatus { armed: true, commander: CommandSource::Guided, ..FlightStatus::default() };
         scene
     }
 
-    /// A vehicle that is flown by the sticks of this seat.
-    fn flown_by(seat: Seat) -> Self {
+    /// A vehicle that is flown by the sticks of this requester.
+    fn flown_by(requester: Requester) -> Self {
         let mut scene = Self::default();
-        assert_eq!(scene.steer(seat, 0.0, true), Ok(()));
+        assert_eq!(scene.steer(requester, 0.0, true), Ok(()));
         scene.status = FlightStatus { armed: true, commander: CommandSource::Pilot, ..FlightStatus::default() };
         scene.pass(20);
-        assert_eq!(scene.steer(seat, 0.0, true), Ok(()));
+        assert_eq!(scene.steer(requester, 0.0, true), Ok(()));
         scene
     }
 
-    fn guide(&mut self, seat: Seat, kind: GuidedKind) -> Result<(), Refusal> {
-        let Self { helm, now, passed, .. } = self;
+    fn guide(&mut self, requester: Requester, kind: GuidedKind) -> Result<(), Refusal> {
+        let Self { arbiter, now, passed, .. } = self;
         let command = GuidedCommand { kind, ..GuidedCommand::default() };
-        helm.guide(*now, seat, command, &mut |what| {
+        arbiter.guide(*now, requester, command, &mut |what| {
             passed.push(what);
             Ok(())
         })
     }
 
-    fn steer(&mut self, seat: Seat, pitch: f32, arm: bool) -> Result<(), Refusal> {
-        self.frame(seat, PilotInput { pitch, arm, ..PilotInput::default() })
+    fn steer(&mut self, requester: Requester, pitch: f32, arm: bool) -> Result<(), Refusal> {
+        self.frame(requester, PilotInput { pitch, arm, ..PilotInput::default() })
     }
 
-    fn frame(&mut self, seat: Seat, input: PilotInput) -> Result<(), Refusal> {
-        let Self { helm, now, passed, status, .. } = self;
-        helm.steer(*now, seat, &input, status, &mut |what| {
+    fn frame(&mut self, requester: Requester, input: PilotInput) -> Result<(), Refusal> {
+        let Self { arbiter, now, passed, status, .. } = self;
+        arbiter.steer(*now, requester, &input, status, &mut |what| {
             passed.push(what);
             Ok(())
         })
@@ -64,7 +64,7 @@ impl Scene {
         let (end, mut signs) = (self.now.as_micros() / 1_000 + millis, 0);
         for ms in (self.now.as_micros() / 1_000..=end).step_by(5) {
             self.now = Instant::from_millis(ms);
-            self.helm.keep(self.now, self.status.armed, &mut |_| {
+            self.arbiter.keep(self.now, self.status.armed, &mut |_| {
                 signs += 1;
                 Ok(())
             });
@@ -79,7 +79,7 @@ impl Scene {
 
     fn told(&mut self) -> Vec<String> {
         let mut all = Vec::new();
-        while let Some((number, told)) = self.helm.told(self.told) {
+        while let Some((number, told)) = self.arbiter.told(self.told) {
             self.told = number;
             all.push(told.to_string());
         }
@@ -89,15 +89,15 @@ impl Scene {
 
 #[test]
 fn a_second_commander_is_told_who_commands_and_does_not_keep_the_flight_of_one_that_has_left_going() {
-    let seats = [PAGE, STATION, OTHER_STATION, PROGRAM];
-    for commander in seats {
-        for other in seats.into_iter().filter(|seat| *seat != commander) {
+    let requesters = [PAGE, STATION, OTHER_STATION, PROGRAM];
+    for commander in requesters {
+        for other in requesters.into_iter().filter(|requester| *requester != commander) {
             let mut scene = Scene::led_by(commander);
             assert_eq!(scene.guide(other, GuidedKind::WayPoint), Err(Refusal::Occupied(commander)));
             assert_eq!(scene.steer(other, 1.0, true), Err(Refusal::Occupied(commander)));
             assert!(scene.pass(2_900) > 20, "its last sign is passed on for three seconds");
             for _ in 0..20 {
-                assert!(!scene.helm.alive(scene.now, other), "a watcher's signs do not count");
+                assert!(!scene.arbiter.alive(scene.now, other), "a watcher's signs do not count");
                 assert_eq!(scene.steer(other, 0.0, true), Err(Refusal::Occupied(commander)));
                 scene.pass(200);
             }
@@ -111,7 +111,7 @@ fn a_second_commander_is_told_who_commands_and_does_not_keep_the_flight_of_one_t
 
 #[test]
 fn everybody_kills_and_lands_and_the_commander_stays() {
-    for other in [STATION, PROGRAM, Seat::Transmitter] {
+    for other in [STATION, PROGRAM, Requester::Transmitter] {
         let mut scene = Scene::led_by(PAGE);
         scene.passed();
         for kind in [GuidedKind::Land, GuidedKind::Kill] {
@@ -120,7 +120,7 @@ fn everybody_kills_and_lands_and_the_commander_stays() {
         let kill = PilotInput { kill: true, ..PilotInput::default() };
         assert_eq!(scene.frame(other, kill), Ok(()));
         assert_eq!(scene.passed().len(), 3);
-        assert_eq!(scene.helm.holder(scene.now), Some(PAGE));
+        assert_eq!(scene.arbiter.holder(scene.now), Some(PAGE));
         let kill = format!("{other}: KILL");
         assert!(scene.told().contains(&kill));
     }
@@ -148,7 +148,8 @@ fn an_arm_switch_that_is_turned_off_lands_a_vehicle_that_another_flies() {
 
 #[test]
 fn of_two_transmitters_one_is_heard_and_the_others_switch_does_not_flap() {
-    for (one, two) in [(STATION, PAGE), (Seat::Transmitter, PAGE), (PAGE, Seat::Transmitter), (STATION, OTHER_STATION)]
+    for (one, two) in
+        [(STATION, PAGE), (Requester::Transmitter, PAGE), (PAGE, Requester::Transmitter), (STATION, OTHER_STATION)]
     {
         // On the ground: who came first.
         let mut scene = Scene::default();
@@ -175,7 +176,7 @@ fn of_two_transmitters_one_is_heard_and_the_others_switch_does_not_flap() {
             assert_eq!(scene.steer(one, 0.9, false), Err(Refusal::Occupied(two)));
             scene.pass(20);
         }
-        assert!(scene.told().contains(&Told { seat: two, what: Asked::Sticks }.to_string()));
+        assert!(scene.told().contains(&CommandNotice { requester: two, what: Asked::Sticks }.to_string()));
         assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Err(Refusal::Occupied(two)));
     }
 }
@@ -198,28 +199,28 @@ fn the_paired_transmitter_takes_over_by_acting_and_a_program_leads_again_when_it
     scene.status.mode = FlightMode::PosHold;
     // Its frames pass, so that the mode machine sees its sticks move, and take nothing over.
     for _ in 0..50 {
-        assert_eq!(scene.steer(Seat::Transmitter, 0.0, true), Ok(()));
-        assert!(scene.helm.alive(scene.now, PROGRAM));
+        assert_eq!(scene.steer(Requester::Transmitter, 0.0, true), Ok(()));
+        assert!(scene.arbiter.alive(scene.now, PROGRAM));
         scene.pass(20);
     }
-    assert_eq!(scene.helm.holder(scene.now), Some(PROGRAM));
+    assert_eq!(scene.arbiter.holder(scene.now), Some(PROGRAM));
     // The pilot moves the sticks, and the mode machine lets him.
     scene.status.commander = CommandSource::Pilot;
     for _ in 0..10 {
-        assert_eq!(scene.steer(Seat::Transmitter, 0.5, true), Ok(()));
+        assert_eq!(scene.steer(Requester::Transmitter, 0.5, true), Ok(()));
         scene.pass(20);
     }
-    assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Err(Refusal::Occupied(Seat::Transmitter)));
+    assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Err(Refusal::Occupied(Requester::Transmitter)));
     assert!(scene.told().contains(&"the transmitter: flies by hand".into()));
     for _ in 0..160 {
-        assert_eq!(scene.steer(Seat::Transmitter, 0.0, true), Ok(()));
+        assert_eq!(scene.steer(Requester::Transmitter, 0.0, true), Ok(()));
         scene.pass(20);
     }
     assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Ok(()));
     // In a manual mode nothing is let go of.
     scene.status.mode = FlightMode::Stabilize;
-    assert_eq!(scene.steer(Seat::Transmitter, 0.0, true), Ok(()));
-    assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Err(Refusal::Occupied(Seat::Transmitter)));
+    assert_eq!(scene.steer(Requester::Transmitter, 0.0, true), Ok(()));
+    assert_eq!(scene.guide(PROGRAM, GuidedKind::WayPoint), Err(Refusal::Occupied(Requester::Transmitter)));
 }
 
 #[test]
@@ -229,7 +230,7 @@ fn a_transmitter_on_a_table_does_not_keep_a_vehicle_in_the_air_that_the_sticks_o
         scene.pass(600);
         scene.passed();
         for _ in 0..200 {
-            assert!(scene.steer(Seat::Transmitter, 0.0, true).is_err());
+            assert!(scene.steer(Requester::Transmitter, 0.0, true).is_err());
             scene.pass(20);
         }
         let sticks = |what: &&Passed| matches!(what, Passed::Sticks(_));
@@ -243,7 +244,7 @@ fn sticks_of_a_station_on_the_ground_keep_no_program_from_commanding() {
     for _ in 0..10 {
         assert_eq!(scene.steer(STATION, 0.0, false), Ok(()));
         // At any time between two frames.
-        assert_eq!(scene.helm.holder(scene.now), None);
+        assert_eq!(scene.arbiter.holder(scene.now), None);
         scene.pass(20);
     }
     assert_eq!(scene.guide(PAGE, GuidedKind::Arm), Ok(()));
@@ -252,14 +253,14 @@ fn sticks_of_a_station_on_the_ground_keep_no_program_from_commanding() {
 /// A page sends its sticks as long as it is open, and a vehicle is armed a moment before its program is known to command.
 #[test]
 fn sticks_whose_arm_switch_is_off_take_no_lease_that_is_free() {
-    for seat in [Seat::Page(2), STATION] {
+    for requester in [Requester::Page(2), STATION] {
         let mut scene = Scene::default();
-        assert_eq!(scene.steer(seat, 0.0, false), Ok(()));
+        assert_eq!(scene.steer(requester, 0.0, false), Ok(()));
         scene.status = FlightStatus { armed: true, commander: CommandSource::Guided, ..FlightStatus::default() };
         scene.pass(20);
-        assert_eq!(scene.steer(seat, 0.0, false), Ok(()), "the mode machine is told that they rest");
-        assert_eq!(scene.helm.holder(scene.now), None);
+        assert_eq!(scene.steer(requester, 0.0, false), Ok(()), "the mode machine is told that they rest");
+        assert_eq!(scene.arbiter.holder(scene.now), None);
         assert_eq!(scene.guide(PAGE, GuidedKind::TakeOff), Ok(()));
-        assert_eq!(scene.steer(seat, 0.0, false), Err(Refusal::Occupied(PAGE)));
+        assert_eq!(scene.steer(requester, 0.0, false), Err(Refusal::Occupied(PAGE)));
     }
 }

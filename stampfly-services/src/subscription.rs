@@ -1,7 +1,8 @@
-//! Who is sent the compact flight record: one station at a time, as long as it says that it wants it.
+//! Streams the compact flight record to one station at a time; the station must renew its request.
 //!
-//! The record comes out of the flight core's ring chunk by chunk, and there is one of it. Whoever asks first has it, and has to ask again every few seconds; a
-//! station that is gone leaves it to the next. As long as nobody asks, nothing is recorded. Not for a log of samples: a station watches topics for that.
+//! There is one record: the chunks that come out of the flight core's ring. The first station that
+//! requests it gets it, and keeps it until it stops renewing. Without a request nothing is recorded.
+//! For samples of single topics a station watches topics instead.
 
 use stampfly_flight::compact::Chunks;
 use stampfly_link::secure::MAX_BODY;
@@ -20,31 +21,31 @@ pub const RADIO_CHUNK: usize = MAX_BODY - 32;
 ///
 /// ```
 /// use stampfly_flight::compact::{Ring, Streamer};
-/// use stampfly_services::Tape;
+/// use stampfly_services::RecordSubscription;
 /// use stampfly_types::Instant;
 /// let mut ring = Ring::<16>::new();
 /// let (mut writer, reader) = ring.split();
-/// let (mut streamer, mut tape, mut room) = (Streamer::new(reader), Tape::new(), [0; 64]);
-/// tape.poll(Instant::ZERO, &mut streamer);
+/// let (mut streamer, mut subscription, mut room) = (Streamer::new(reader), RecordSubscription::new(), [0; 64]);
+/// subscription.poll(Instant::ZERO, &mut streamer);
 /// assert!(!writer.is_wanted());
 ///
-/// assert!(tape.ask(Instant::ZERO, "cable", true) && !tape.ask(Instant::ZERO, "radio", true));
-/// tape.poll(Instant::ZERO, &mut streamer);
+/// assert!(subscription.ask(Instant::ZERO, "cable", true) && !subscription.ask(Instant::ZERO, "radio", true));
+/// subscription.poll(Instant::ZERO, &mut streamer);
 /// assert!(writer.is_wanted());
 /// writer.word(7);
 /// writer.commit();
-/// assert_eq!(tape.chunk("radio", &mut streamer, &mut room, 1), None);
-/// assert!(tape.chunk("cable", &mut streamer, &mut room, 1).is_some());
+/// assert_eq!(subscription.chunk("radio", &mut streamer, &mut room, 1), None);
+/// assert!(subscription.chunk("cable", &mut streamer, &mut room, 1).is_some());
 ///
-/// tape.poll(Instant::from_millis(5_000), &mut streamer);
-/// assert!(!writer.is_wanted() && tape.ask(Instant::from_millis(5_000), "radio", true));
+/// subscription.poll(Instant::from_millis(5_000), &mut streamer);
+/// assert!(!writer.is_wanted() && subscription.ask(Instant::from_millis(5_000), "radio", true));
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Tape<T> {
+pub struct RecordSubscription<T> {
     taker: Option<(T, Instant)>,
 }
 
-impl<T: Copy + PartialEq> Tape<T> {
+impl<T: Copy + PartialEq> RecordSubscription<T> {
     /// Nobody has it.
     #[must_use]
     pub const fn new() -> Self {
