@@ -90,7 +90,7 @@ hypotheses! {
     range_wrapped: RangeWrapped,
 }
 
-/// Sensor monitor. See the [crate](crate) documentation for its use.
+/// Sensor monitor. See the [crate] documentation for its use.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Monitor {
