@@ -1,35 +1,41 @@
-//! Airspeed and wind from a pitot tube beside an estimator, and whether the tube is to be believed.
+//! Airspeed and wind from a pitot tube, with a plausibility check of the tube.
 //!
-//! A tube that is blocked, iced or wet shows some pressure or other, and an aircraft that believes it dives or stalls. Beside a satellite receiver it can be judged: the velocity over the ground less the wind that was learnt is the
-//! airspeed, too, as long as the receiver has a fix. While a tube is not believed, that is what counts, and the wind stays as it was. On the ground there is nothing to compare it with.
+//! A tube that is blocked, iced or wet shows an arbitrary pressure, and an aircraft that uses it
+//! dives or stalls. With a satellite receiver the tube can be checked: ground velocity minus the
+//! estimated wind is a second airspeed, valid as long as the receiver has a fix. While the tube is
+//! rejected, that airspeed is used and the wind estimate is held. On the ground there is no
+//! reference, so the tube is not checked.
 //!
-//! Use it for whatever flies fast enough for a tube. Not for a multirotor.
+//! Use it for any vehicle that flies fast enough for a pitot tube. Not for a multirotor.
 
 use crate::aid::airspeed::Wind;
 use crate::estimator::Estimator;
 use stampfly_types::messages::{AirState, AirspeedData, SensorMask, StateEstimate, Validity};
 use stampfly_types::{Duration, Instant, Stamped, Vec3, math};
 
-/// A tube that has been silent for longer is none.
+/// After this time without samples the tube counts as absent.
 const SILENT: Duration = Duration::from_millis(500);
-/// Standard deviation of an airspeed, m/s: the tube's scale.
+/// Standard deviation of an airspeed, m/s, from the scale error of the tube.
 const SIGMA: f32 = 0.6;
-/// Slower than this, m/s, a tube shows nothing of the wind.
+/// Lowest airspeed used to estimate the wind, m/s.
 const SLOW: f32 = 6.0;
-/// Density of the air in the standard atmosphere at sea level, kg/m³, and how far an altitude thins it, 1/m (ICAO doc 7488).
+/// Air density at sea level of the standard atmosphere, kg/m³, and its relative decrease per metre
+/// of altitude, 1/m (ICAO doc 7488).
 const DENSITY: f32 = 1.225;
 const THINNER: f32 = 1.0 / 9_500.0;
-/// A tube is not believed when it has disagreed by this share and this speed, m/s, for so long, s; and again after so long.
+/// The tube is rejected when it differs from the reference by more than this share and this speed,
+/// m/s, for `DOUBT` seconds. It is accepted again after `TRUST` seconds of agreement.
 const DISAGREES: (f32, f32) = (0.25, 3.0);
 const DOUBT: f32 = 1.0;
 const TRUST: f32 = 10.0;
-/// A wind that is known worse than this, m/s, contradicts only a tube that shows less than this share: no wind that anybody takes off with is so strong.
-/// Nothing contradicts anybody while both are slower than the last of these, m/s.
+/// With a wind standard deviation above `KNOWN_WIND`, m/s, the tube is rejected only below the
+/// share `NO_WIND` of the reference, because no wind in which the aircraft takes off explains that.
+/// Below `FLIES`, m/s, nothing is compared.
 const KNOWN_WIND: f32 = 2.5;
 const NO_WIND: f32 = 0.4;
 const FLIES: f32 = 8.0;
 
-/// The air around an aircraft.
+/// Airspeed and wind of an aircraft.
 ///
 /// ```
 /// use stampfly_eskf::{Air, Eskf, EskfConfig, Estimator};
@@ -44,19 +50,21 @@ const FLIES: f32 = 8.0;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Air {
     wind: Wind,
-    /// Airspeed when nothing shows it, m/s.
+    /// Airspeed assumed when no source is available, m/s.
     unknown: f32,
     altitude: f32,
-    /// The tube's last speed, and when it was.
+    /// Time and speed of the tube's last sample.
     tube: Option<(Instant, f32)>,
-    /// For how long it has disagreed, or agreed again, s.
+    /// Time for which the tube has contradicted its present verdict, s.
     doubt: f32,
     believed: bool,
     last: Instant,
 }
 
 impl Air {
-    /// Before the first sample. `unknown`: the airspeed when nothing shows it, m/s. Its cruise, so that nobody takes it for standing and deflects its surfaces too far.
+    /// State before the first sample. `unknown` is the airspeed used when no source is available,
+    /// m/s: the cruise speed, because a controller that assumes a lower one deflects the surfaces
+    /// too far.
     #[must_use]
     pub fn new(unknown: f32) -> Self {
         Self {
@@ -70,7 +78,8 @@ impl Air {
         }
     }
 
-    /// Takes the tube's samples since the last step, the pressure altitude, m, and whether it stands on the ground.
+    /// Processes the tube's samples since the last step. `altitude` is the pressure altitude, m;
+    /// `on_ground` disables the plausibility check.
     pub fn step(
         &mut self,
         now: Instant,
@@ -94,26 +103,27 @@ impl Air {
             let speed = math::sqrt(2.0 * data.pressure.max(0.0) / self.density());
             self.tube = Some((*at, speed));
             if self.believed && speed > SLOW && !on_ground && is_moving {
-                // What became of it is counted there.
+                // The estimator counts the result in its own tally.
                 let _ = estimator.fuse_airspeed(*at, speed, SIGMA, &mut self.wind);
             }
         }
         let heard = self.tube.filter(|(at, _)| now.since(*at) < SILENT).map(|(_, speed)| speed);
         if on_ground {
-            // A new flight begins with trust.
+            // Each flight starts with the tube accepted.
             (self.believed, self.doubt) = (heard.is_some(), 0.0);
             return;
         }
-        // A velocity that nobody corrects drifts, and would condemn the one sensor that still holds it.
+        // Without external aiding the velocity drifts; it must not reject the one sensor that still
+        // bounds it.
         let is_judge = estimate.sensors.contains(SensorMask::EXTERNAL);
         let agrees = match (heard, self.through_air(&estimate).filter(|_| is_judge)) {
             (None, _) => Some(false),
-            // A tube that hardly moves feels the wind along the nose alone.
+            // Below `FLIES` the tube may measure only the component of the wind along the nose.
             (Some(speed), Some(other)) if speed.max(other) > FLIES => Some(match self.wind.sigma() < KNOWN_WIND {
                 true => (speed - other).abs() <= (DISAGREES.0 * other).max(DISAGREES.1),
                 false => speed >= NO_WIND * other,
             }),
-            // Nothing to compare it with: that is no reason to believe it again, nor to doubt it.
+            // No reference: keep the present verdict.
             _ => None,
         };
         let changes = agrees.is_some_and(|agrees| agrees != self.believed);
@@ -123,7 +133,7 @@ impl Air {
         }
     }
 
-    /// Speed through the air as velocity and wind have it, m/s.
+    /// Airspeed from velocity and wind estimate, m/s.
     fn through_air(&self, estimate: &StateEstimate) -> Option<f32> {
         let [north, east] = self.wind.velocity();
         let air = estimate.velocity - Vec3::new(north, east, 0.0);
@@ -134,7 +144,7 @@ impl Air {
         DENSITY * (1.0 - self.altitude.clamp(-500.0, 5_000.0) * THINNER)
     }
 
-    /// Airspeed and wind, where the estimator says this.
+    /// Airspeed and wind for this estimate.
     #[must_use]
     pub fn state(&self, estimate: &StateEstimate) -> AirState {
         let tube = self.tube.filter(|_| self.believed).map(|(_, speed)| speed);

@@ -1,12 +1,13 @@
 //! A complementary filter: gyro at high frequencies, gravity, range and flow at low ones.
 //!
-//! Proves that the estimator can be swapped, and serves where a few hundred bytes and some fifty nanoseconds must do.
-//! It has fixed gains, no covariance, no gates beyond plain limits, and no accelerometer bias: in aggressive flight
-//! its tilt is some degrees worse than the [`Eskf`](crate::Eskf)'s.
+//! Use it where a few hundred bytes and some fifty nanoseconds per step must do, or as a second
+//! implementation of [`Estimator`]. It has fixed gains, no covariance, no gates except fixed
+//! limits, and does not estimate the accelerometer bias. In aggressive flight its tilt is some
+//! degrees worse than that of [`Eskf`](crate::Eskf).
 //!
-//! Attitude: Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE TAC
-//! 53(5), 2008, with the kinematic acceleration of the velocity estimate removed. Height and velocity: third-order
-//! fixed-gain observers.
+//! Attitude: Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal
+//! group", IEEE TAC 53(5), 2008, corrected by gravity only while the velocity is not measured.
+//! Height and velocity: fixed-gain observers. Units are SI, the world frame is NED.
 
 use crate::estimator::{Estimator, Fusion, Refusal};
 use crate::filter::NominalState;
@@ -22,19 +23,19 @@ use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ComplementaryConfig {
-    /// Attitude correction by gravity, 1/s.
+    /// Gain of the attitude correction by gravity, 1/s.
     pub gravity_gain: f32,
-    /// Gyro bias correction by gravity, 1/s².
+    /// Gain of the gyro bias correction by gravity, 1/s².
     pub bias_gain: f32,
-    /// Share of a range's error that goes into height.
+    /// Share of a range's innovation added to the height.
     pub tof_position_gain: f32,
-    /// Share of a range's error that goes into climb rate, 1/s.
+    /// Gain from a range's innovation to the climb rate, 1/s.
     pub tof_velocity_gain: f32,
-    /// Share of a flow sample's error that goes into velocity.
+    /// Share of a flow sample's innovation added to the velocity.
     pub flow_gain: f32,
-    /// Share of a flow sample's error that goes into tilt, rad per m/s.
+    /// Gain from a flow sample's innovation to the tilt, rad per m/s.
     pub flow_tilt_gain: f32,
-    /// Distance from the sensor to the ground while standing, m.
+    /// Distance from the range sensor to the ground while standing, m.
     pub ground_clearance: f32,
 }
 
@@ -83,7 +84,7 @@ pub struct Complementary {
 }
 
 impl Complementary {
-    /// A filter that waits to be initialised.
+    /// A filter that is not yet initialised.
     #[must_use]
     pub fn new(config: ComplementaryConfig) -> Self {
         Self {
@@ -160,8 +161,10 @@ impl Estimator for Complementary {
             return;
         }
         self.now = at;
+        // Bounds the step over a gap in the samples.
         let dt = dt.min(0.5);
-        // Thrust carries the weight along the body's axis, and says nothing about which way is up.
+        // Without the accelerometer, assume that thrust carries the weight along body z. That
+        // assumption holds no information about tilt.
         let felt = !self.command.accel_faulty;
         let accel = if felt { imu.accel } else { Vec3::new(0.0, 0.0, -GRAVITY) };
         let motion = self.state.propagate(&accel, &imu.gyro, dt);
@@ -171,9 +174,11 @@ impl Estimator for Complementary {
             self.state.position = anchor;
             self.state.velocity = Vec3::zeros();
         }
-        // In flight over a visible surface flow holds the tilt; otherwise gravity does.
+        // With a measured velocity, flow corrects the tilt; gravity would be wrong by the body's
+        // acceleration.
         if felt && (stationary || !self.recent(self.flow_fused)) {
             let norm = imu.accel.norm();
+            // Beyond 20 % the body accelerates, and the specific force does not point up.
             if (0.8 * GRAVITY..1.2 * GRAVITY).contains(&norm) {
                 let up = rotate_back(&self.state.rotation(), &-Vec3::z());
                 let error = (imu.accel / norm).cross(&up);
@@ -204,6 +209,8 @@ impl Estimator for Complementary {
         let below = tof.distance * cos_tilt;
         let surface = *self.surface.get_or_insert(self.state.position.z + below);
         if let Some(anchor) = self.anchor {
+            // On the ground the height is known and the range measures the surface; in flight it is
+            // the reverse.
             self.surface = Some(surface + 0.1 * (anchor.z + below - surface));
         } else {
             let error = (surface - below) - self.state.position.z;
@@ -233,7 +240,8 @@ impl Estimator for Complementary {
         self.status.flow_innovation = [error.x, error.y];
         if self.anchor.is_none() {
             self.state.velocity += rotate(&rotation, &error) * self.config.flow_gain;
-            // Faster forward than expected means the nose is lower than estimated.
+            // A velocity forward that is larger than predicted means that the nose is lower than
+            // estimated.
             self.turn(Vec3::new(error.y, -error.x, 0.0) * self.config.flow_tilt_gain);
         }
         self.flow_fused = Some(self.now);
@@ -250,7 +258,7 @@ impl Estimator for Complementary {
 
     fn fuse_velocity(&mut self, _: Instant, velocity: &Vec3, sigma: &Vec3) -> Fusion {
         for axis in 0..3 {
-            // An axis that was not measured stays as it is.
+            // An axis with an infinite standard deviation was not measured and stays unchanged.
             let error = if sigma[axis].is_infinite() { 0.0 } else { velocity[axis] - self.state.velocity[axis] };
             if !error.is_finite() {
                 return Fusion::Refused(Refusal::NotFinite);

@@ -1,160 +1,183 @@
-//! Everything about the error-state Kalman filter that can be tuned, with the reason for each default.
+//! Tuning parameters of the error-state Kalman filter, with the reason for each default.
 
 use stampfly_types::Vec3;
 
-/// Tuning of [`Eskf`](crate::Eskf). One set serves a sensor suite; the defaults are those of a small vehicle indoors (BMI270,
-/// VL53L3CX, PMW3901, BMP280); [`EskfConfig::outdoors`] is for satellite receivers.
+/// Tuning of [`Eskf`](crate::Eskf).
+///
+/// One set of values describes one sensor suite. The defaults are for a small multirotor indoors
+/// with BMI270, VL53L3CX, PMW3901 and BMP280. Start from [`EskfConfig::indoors`] for a vehicle in a
+/// room and from [`EskfConfig::outdoors`] for a satellite receiver.
+///
+/// All standard deviations are one sigma. Units are SI and stated at each field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EskfConfig {
-    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016: it stands for errors of scale and
-    /// axes; vibration is `accel_vibration`.
+    /// Accelerometer noise density, m/s²/√Hz. Far above the data sheet's 0.0016, because it also
+    /// covers errors of scale and axis alignment. Vibration is added through `accel_vibration`.
     pub accel_noise: f32,
     /// Gyro noise density, rad/s/√Hz. Above the data sheet's 0.00012 for the same reason.
     pub gyro_noise: f32,
-    /// Share of the squared change of the accelerometer from sample to sample that adds to its noise, 1. A third for
-    /// white noise of 800 Hz bandwidth sampled at 400 Hz. See [`Vibration`](crate::filter::Vibration).
+    /// Share (0 to 1) of the squared sample-to-sample change of the accelerometer that is added to
+    /// its noise variance. One third suits white noise of 800 Hz bandwidth sampled at 400 Hz. See
+    /// [`Vibration`](crate::filter::Vibration).
     pub accel_vibration: f32,
-    /// The same for the gyro.
+    /// The same share for the gyro.
     pub gyro_vibration: f32,
-    /// Largest angular acceleration of the body, rad/s². An inertial sample that asks for more is
-    /// garbage, unless it goes on: up to three running that follow from each other, and 20 that do
-    /// not, are bridged with the last sample before them.
+    /// Largest angular acceleration of the body, rad/s². An inertial sample that implies more is
+    /// treated as corrupt and bridged with the last good sample. Up to three consecutive samples
+    /// are bridged if they are consistent with each other, and up to 20 if they are not; after that
+    /// the samples are used.
     pub angular_acceleration: f32,
-    /// Full scale of the accelerometer, m/s²: a sample with every axis there is garbage in the same way.
+    /// Full scale of the accelerometer, m/s². A sample with every axis at full scale is treated as
+    /// corrupt, too.
     pub accel_full_scale: f32,
-    /// Gyro bias random walk, rad/s/√s.
+    /// Random walk of the gyro bias, rad/s/√s.
     pub gyro_bias_walk: f32,
-    /// Accelerometer bias random walk, m/s²/√s.
+    /// Random walk of the accelerometer bias, m/s²/√s.
     pub accel_bias_walk: f32,
 
-    /// First standard deviation of position, m.
+    /// Initial standard deviation of position, m.
     pub initial_position: f32,
-    /// First standard deviation of velocity, m/s.
+    /// Initial standard deviation of velocity, m/s.
     pub initial_velocity: f32,
-    /// First standard deviation of attitude, rad.
+    /// Initial standard deviation of attitude, rad.
     pub initial_attitude: f32,
-    /// First standard deviation of the gyro bias after a still-calibration, rad/s.
+    /// Initial standard deviation of the gyro bias after a still calibration, rad/s.
     pub initial_gyro_bias: f32,
-    /// First standard deviation of the accelerometer bias, m/s². MEMS start-up biases are 0.1 to 0.4, but most of the
-    /// horizontal part already went into the first attitude.
+    /// Initial standard deviation of the accelerometer bias, m/s². MEMS start-up biases are 0.1 to
+    /// 0.4, but most of the horizontal part has already been absorbed by the initial attitude.
     pub initial_accel_bias: f32,
-    /// How far vibration may move the accelerometer's vertical zero when the motors start, m/s². Recorded StampFly
-    /// flights average −8.7 to −9.2 instead of −9.8.
+    /// Standard deviation added to the accelerometer's vertical bias when the motors start, m/s²:
+    /// vibration rectification. Recorded StampFly flights average −8.7 to −9.2 instead of −9.8.
     pub vibration_bias: f32,
-    /// How fast the accelerometer's vertical zero moves in flight, m/s²/√s, because the vibration changes with the thrust. Used while no
-    /// range shows the zero: the barometer then finds a zero that has moved by 1 m/s² within three seconds.
+    /// Random walk of the accelerometer's vertical bias in flight, m/s²/√s, because vibration
+    /// changes with thrust. Applied only while no range observes that bias; the barometer then
+    /// finds a bias change of 1 m/s² within three seconds.
     pub thrust_bias_walk: f32,
 
     /// Standard deviation of a range, m.
     pub tof_sigma: f32,
-    /// Nearest range used, m.
+    /// Shortest range used, m.
     pub tof_min: f32,
-    /// Farthest range used, m.
+    /// Longest range used, m.
     pub tof_max: f32,
-    /// Largest tilt at which the level-surface model holds, as the cosine.
+    /// Cosine of the largest tilt at which the level-surface model is used.
     pub min_cos_tilt: f32,
-    /// Distance from the sensor to the ground while standing, m: used when the sensor is blind there.
+    /// Distance from the range sensor to the ground while the vehicle stands, m. Used where the
+    /// sensor has no reading at that distance.
     pub ground_clearance: f32,
 
-    /// Standard deviation of a flow sample, rad/s: one count in ten milliseconds is 0.22.
+    /// Standard deviation of a flow sample, rad/s. One count in 10 ms is 0.22 rad/s.
     pub flow_sigma: f32,
-    /// Part of the flow error that grows with the image's motion, as a share. A PMW3901 sees 121 frames a second and is
-    /// read a hundred times: a reading holds one frame's motion or two, so it is 17 % low or 65 % high.
+    /// Part of the flow error that is proportional to the image motion, as a share. A PMW3901 takes
+    /// 121 frames a second and is read 100 times a second, so a reading holds the motion of one
+    /// frame or of two: it is 17 % low or 65 % high.
     pub flow_scale_sigma: f32,
-    /// How long before its stamp a flow sample's stretch of time ended, s: pictures wait to be compared and read. 4 ms
-    /// by the data sheet, 17 in recorded logs, where the logger is part of it.
+    /// Delay between the end of the interval that a flow sample covers and its time stamp, s:
+    /// frames wait for comparison and readout. 4 ms by the data sheet; 17 ms in recorded logs, part
+    /// of which is the logger.
     pub flow_delay: f32,
-    /// Smallest surface quality used.
+    /// Lowest surface quality used.
     pub flow_min_quality: u8,
-    /// Nearer to the floor, m, the picture is blurred: a PMW3901 works from 80 mm on. A take-off does
-    /// not use it.
+    /// Shortest distance to the floor at which flow is used, m. The image is blurred closer to it:
+    /// a PMW3901 works from 80 mm. During a take-off, flow is not used below this distance.
     pub flow_min_distance: f32,
-    /// Fastest motion of the picture that the camera follows, rad/s: 7.4 for a PMW3901. A faster one it
-    /// shows as another.
+    /// Fastest image motion that the camera tracks, rad/s: 7.4 for a PMW3901. Faster motion aliases
+    /// to a wrong reading.
     pub flow_max_rate: f32,
 
     /// Standard deviation of a barometric altitude, m.
     pub baro_sigma: f32,
-    /// Use the barometer.
+    /// Fuse the barometer.
     pub baro_enable: bool,
-    /// While something from outside measures the height, the barometer only learns its zero, and holds the height when the other
-    /// is silent for two seconds. Its zero is kept apart from the state, without their correlation, so that beside a receiver,
-    /// which is worse than the barometer from second to second, its many samples would claim a height that nobody knows.
+    /// Use the barometer as a backup: while an external measurement of the height is younger than
+    /// two seconds, the barometer only estimates its offset; afterwards it holds the height. The
+    /// offset is not a filter state and has no correlation with the others. A receiver is noisier
+    /// than the barometer from second to second, so if both were fused, the many barometer samples
+    /// would make the height variance too small.
     pub baro_backup: bool,
-    /// How fast the barometer's zero drifts, m/√s: a metre an hour is 0.017.
+    /// Random walk of the barometer's offset, m/√s. 0.017 is one metre an hour.
     pub baro_walk: f32,
-    /// How far starting propellers move the barometer's zero, m, and how uncertain its altitude is near the floor. StampFlys read 0.6 m
-    /// lower at the floor with turning propellers, and 0.2 m lower above it.
+    /// Shift of the barometer's offset when the propellers start, and standard deviation of its
+    /// altitude near the floor, m. With turning propellers a StampFly reads 0.6 m lower at the
+    /// floor and 0.2 m lower above it.
     pub baro_wash: f32,
     /// Standard deviation of a magnetic direction, rad.
     pub mag_sigma: f32,
-    /// What of the magnetic field is used.
+    /// Which part of the magnetic field is used.
     pub mag_model: MagModel,
-    /// Use the magnetometer. Off by default: the StampFly's motor currents bend the field.
+    /// Fuse the magnetometer. Off by default: the StampFly's motor currents distort the field.
     pub mag_enable: bool,
 
-    /// When the accelerometer is an inclinometer.
+    /// When the accelerometer is used as an inclinometer.
     pub gravity_use: GravityUse,
-    /// Its standard deviation as one, m/s².
+    /// Standard deviation of the accelerometer as an inclinometer in flight, m/s².
     pub gravity_sigma: f32,
     /// The same while stationary, m/s².
     pub stationary_gravity_sigma: f32,
-    /// Standard deviation of "does not move" while stationary, m/s.
+    /// Standard deviation of the zero-velocity update while stationary, m/s.
     pub stationary_velocity_sigma: f32,
-    /// Standard deviation of "is where it stood" while stationary, m.
+    /// Standard deviation of the update that holds the position while stationary, m.
     pub stationary_position_sigma: f32,
 
-    /// Share of its velocity through still air that a multirotor loses each second to the drag of rotors and body, 1/s. It is the
-    /// only thing that shows the velocity when nothing measures it; half or twice the true one still does. 0: not used.
+    /// Linear drag of a multirotor divided by its mass, 1/s: the share of its airspeed that drag of
+    /// rotors and body removes per second. Drag is the only source of velocity when no sensor
+    /// measures it. An error of a factor of two is acceptable. 0 disables it.
     pub drag: f32,
-    /// Standard deviation of the wind, m/s, an error of that velocity.
+    /// Standard deviation of the wind, m/s: the error of a velocity derived from drag.
     pub wind: f32,
 
-    /// Standard deviation of "hardly moves" while tilted too far to see the ground, (m/s)·√s: divided by the
-    /// accelerometer noise it is the time in which the velocity fades.
+    /// Standard deviation of the pseudo-measurement "velocity is small" while the vehicle is tilted
+    /// too far to see the ground, (m/s)·√s. Divided by the accelerometer noise it is the time
+    /// constant with which the velocity decays.
     pub unobserved_velocity: f32,
 
-    /// Gates, in standard deviations.
+    /// Innovation gate, in standard deviations of one axis.
     pub gate: f32,
-    /// Lock-out time: after this long with every measurement of a sensor rejected, the state is reset to it, s. Of range, flow,
-    /// barometer, magnetometer and gravity.
+    /// Lock-out time, s: when every measurement of a sensor has been rejected for this long, the
+    /// state is reset to that sensor. Applies to range, flow, barometer, magnetometer and gravity.
     pub lockout: f32,
-    /// The same for position, velocity and attitude from outside, s. A receiver between walls is wrong for seconds.
+    /// Lock-out time of external position, velocity and attitude, s. A receiver between walls is
+    /// wrong for seconds.
     pub external_lockout: f32,
-    /// Measurements rejected running that a reset needs besides the time: two bad fixes of a slow receiver are no lock-out.
+    /// Number of consecutive rejections that a reset requires in addition to the lock-out time, so
+    /// that two bad fixes of a slow receiver do not cause a reset.
     pub lockout_samples: u16,
 
-    /// Oldest measurement that is placed in time, s: the delay of the slowest sensor, and what its clock may be wrong by. The
-    /// memory has the same size for any; beyond 0.11 s it becomes coarser, see [`History`](crate::filter::History).
+    /// Age of the oldest measurement that is accepted, s: the delay of the slowest sensor plus its
+    /// clock error. The memory used does not depend on it. Beyond 0.11 s the history becomes
+    /// coarser, see [`History`](crate::filter::History).
     pub horizon: f32,
-    /// Positions from outside may be wrong by the same for minutes, as those of satellite receivers are: a position is then not
-    /// claimed better than the part of its stated deviation that does not show from fix to fix.
+    /// External positions may have an error that stays constant for minutes, as those of satellite
+    /// receivers do. The position variance is then not reduced below the part of the stated
+    /// variance that does not show as scatter from fix to fix.
     pub position_wander: bool,
-    /// For how long position and velocity from outside, and measurements of one's own, hold the outputs valid, s. Meanwhile the
-    /// inertial sensor carries them and the covariance says how far.
+    /// Time for which a measurement of external position or velocity, or of
+    /// [`Eskf::fuse`](crate::Eskf::fuse), keeps the outputs valid, s. In between, the inertial
+    /// sensor propagates them and the covariance states the error.
     pub aiding_timeout: f32,
-    /// Standard deviation at which a velocity that nothing measures is given up and set to zero, m/s.
+    /// Standard deviation at which an unmeasured velocity is reset to zero, m/s.
     pub unaided_velocity: f32,
-    /// Largest standard deviation of a position that nothing measures, m.
+    /// Largest standard deviation of an unmeasured position, m.
     pub unaided_position: f32,
-    /// A position farther from the origin along any axis is divergence, m. At 100 km an `f32` resolves 8 mm, and the earth is no
-    /// longer flat.
+    /// Largest coordinate of the position along any axis, m; beyond it the filter reports
+    /// divergence. At 100 km an `f32` resolves 8 mm and the flat-earth model no longer holds.
     pub max_position: f32,
-    /// A velocity above this along any axis is divergence, m/s.
+    /// Largest velocity along any axis, m/s; beyond it the filter reports divergence.
     pub max_velocity: f32,
 
-    /// What is known about the heading at the start.
+    /// Knowledge of the heading at the start.
     pub start_heading: StartHeading,
-    /// The earth's field at the place, true NED; its length does not matter. `None`: north is magnetic north, and the inclination
-    /// that of the calibration. [`aid::field::earth`](crate::aid::field::earth) makes one from declination and inclination. With
-    /// [`StartHeading::Nose`] it is not looked at.
+    /// Earth's magnetic field at the place of operation, true NED; its length is ignored. `None`:
+    /// north is magnetic north, and the inclination is taken from the calibration.
+    /// [`aid::field::earth`](crate::aid::field::earth) computes it from declination and
+    /// inclination. Ignored with [`StartHeading::Nose`].
     pub earth_field: Option<Vec3>,
 }
 
 impl EskfConfig {
-    /// For a small multirotor in a room: position or pose from cameras, if any, comes so often that two rejected ones are many, and
-    /// what is 100 m away or flies at 50 m/s is lost.
+    /// For a small multirotor in a room. Poses from cameras, if any, are frequent, so a short
+    /// lock-out suffices; a position beyond 100 m or a velocity beyond 50 m/s is divergence.
     ///
     /// ```
     /// use stampfly_eskf::EskfConfig;
@@ -165,22 +188,23 @@ impl EskfConfig {
         Self { max_position: 100.0, max_velocity: 50.0, external_lockout: 0.2, lockout_samples: 1, ..Self::default() }
     }
 
-    /// For a vehicle under the open sky: satellite receiver up to half a second late, barometer, perhaps a magnetometer, its own
-    /// inertial sensor at any rate. Set noise densities, `mag_enable` and what the start knows of the heading to yours.
+    /// For a vehicle outdoors with a satellite receiver (up to half a second late), a barometer and
+    /// possibly a magnetometer. Set the noise densities, `mag_enable` and `start_heading` for your
+    /// vehicle.
     ///
-    /// | differs from the default | because |
+    /// | differs from the default | reason |
     /// |---|---|
     /// | `horizon` 0.5 s | receivers report 50 to 300 ms late |
-    /// | `external_lockout` 5 s of at least 10 fixes | a reflected signal lasts seconds |
+    /// | `external_lockout` 5 s, at least 10 fixes | a reflected signal lasts seconds |
     /// | `aiding_timeout` 10 s | receivers pause under trees and bridges |
-    /// | `unaided_velocity`, `unaided_position` | a vehicle that nothing measures is not standing |
-    /// | `initial_position` 10 km | the first fix says where it is; a barometer has nothing to be compared with until then |
-    /// | `gravity_sigma` 10 m/s² | without fixes a vehicle that circles or speeds up is not upright because it feels so |
-    /// | `position_wander` | a receiver's error stays the same for a minute |
-    /// | `baro_backup` | a receiver's height beside a barometer's |
-    /// | `start_heading` unknown | the receiver knows north, the nose does not |
-    /// | `accel_noise`, `initial_accel_bias` | vibration is told by `accel_vibration`; start-up bias of any MEMS part |
-    /// | `vibration_bias`, `baro_wash` 0 | no small multirotor's propellers |
+    /// | `unaided_velocity`, `unaided_position` | a vehicle without aiding is not standing still |
+    /// | `initial_position` 10 km | position is unknown until the first fix |
+    /// | `gravity_sigma` 10 m/s² | circling without fixes must not be taken for level |
+    /// | `position_wander` | a receiver's error stays constant for a minute |
+    /// | `baro_backup` | the receiver measures the height; the barometer bridges gaps |
+    /// | `start_heading` unknown | the receiver's velocity defines north |
+    /// | `accel_noise`, `initial_accel_bias` | vibration adds noise; start-up bias of any MEMS part |
+    /// | `vibration_bias`, `baro_wash` 0 | these describe a small multirotor's propellers |
     ///
     /// ```
     /// use stampfly_eskf::{EskfConfig, StartHeading, aid::field};
@@ -216,8 +240,9 @@ impl EskfConfig {
         }
     }
 
-    /// Squared Mahalanobis distance at which the gate of a measurement of so many axes lies. A vector of more axes is
-    /// more often far away by chance: its gate is wider, for the same chance (6·10⁻⁵ at four standard deviations).
+    /// Squared Mahalanobis distance of the gate for a measurement of `axes` axes. A vector of more
+    /// axes is more often far away by chance, so its gate is wider for the same probability (6·10⁻⁵
+    /// at four standard deviations).
     ///
     /// ```
     /// let config = stampfly_eskf::EskfConfig { gate: 4.0, ..Default::default() };
@@ -230,37 +255,42 @@ impl EskfConfig {
         self.gate * self.gate * Self::axes_factor(axes)
     }
 
-    /// Squared gate of so many axes, relative to that of one.
+    /// Squared gate of `axes` axes, relative to that of one.
     #[inline]
     pub(crate) fn axes_factor(axes: usize) -> f32 {
         GATE_OF_AXES.get(axes).copied().unwrap_or(GATE_OF_MORE)
     }
 }
 
-/// Squared gate, relative to that of one axis.
+/// Squared gate for 0 to 3 axes, relative to that of one axis.
 const GATE_OF_AXES: [f32; 4] = [1.0, 1.0, 1.21, 1.38];
-/// The same for more than three: that of six, 31.9 of 16, which is on the safe side for four and five.
+/// The same for more than three axes: the value for six (31.9 / 16), conservative for four and
+/// five.
 const GATE_OF_MORE: f32 = 1.8;
 
-/// What is known about the heading at the start, and with it where north is.
+/// Knowledge of the heading at the start; it also defines "north".
 ///
-/// With all but the first, `north` is true north, or magnetic north without [`EskfConfig::earth_field`], and
-/// [`Validity::HEADING`](stampfly_types::messages::Validity::HEADING) is set only while the heading is known to a third of
-/// a radian.
+/// With every variant except [`Nose`](Self::Nose), north is true north, or magnetic north without
+/// [`EskfConfig::earth_field`], and
+/// [`Validity::HEADING`](stampfly_types::messages::Validity::HEADING) is set only while the
+/// standard deviation of the heading is below a third of a radian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum StartHeading {
-    /// "North" is where the nose points at the start: for rooms, where nothing tells another north. **Not for satellite
-    /// receivers**, whose north is another one: their velocities would contradict the attitude.
+    /// North is where the nose points at the start: for rooms without another reference. **Not for
+    /// satellite receivers**: their velocities refer to true north and would contradict the
+    /// attitude.
     #[default]
     Nose,
-    /// Not known: the first changes of a velocity from outside show it. Until then horizontal velocity, position and heading are
-    /// not valid. The vehicle must stand at its calibration and then accelerate, in any direction.
+    /// Unknown: found from the first changes of an external velocity. Until then horizontal
+    /// velocity, position and heading are not valid. The vehicle must stand still during
+    /// calibration and then accelerate, in any direction.
     Unknown,
-    /// From the field of the calibration. Without one it is [`Unknown`](Self::Unknown).
+    /// From the magnetic field of the calibration. Without one, the same as
+    /// [`Unknown`](Self::Unknown).
     Magnetic,
-    /// Given: by a pilot, by two antennas, by a mark on the runway.
+    /// Given, for example by a pilot, a two-antenna receiver or the direction of a runway.
     Given {
         /// Heading, rad, east of north.
         heading: f32,
@@ -269,26 +299,28 @@ pub enum StartHeading {
     },
 }
 
-/// What of the magnetic field is used.
+/// Which part of the magnetic field is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MagModel {
-    /// Its heading only: nearby motors bend it by more than any tilt. See [`aid::heading`](crate::aid::heading).
+    /// Heading only, because nearby motors distort the field by more than any tilt. See
+    /// [`aid::heading`](crate::aid::heading).
     #[default]
     Heading,
-    /// All three axes, tilt included: nothing bends it. See [`aid::field`](crate::aid::field).
+    /// All three axes, including tilt, for a field that is not distorted. See
+    /// [`aid::field`](crate::aid::field).
     Field,
 }
 
-/// When the accelerometer is an inclinometer.
+/// When the accelerometer is used as an inclinometer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GravityUse {
-    /// While nothing measures velocity: otherwise velocity shows the tilt, and better.
+    /// While velocity is not measured. A measured velocity observes the tilt better.
     #[default]
     WhenUnaided,
-    /// All inertial samples, by their mean over 10 ms, less the acceleration that measured velocities show: for a vehicle whose velocity is
-    /// measured badly and whose motors do not shake it.
+    /// Always: the mean of the inertial samples over 10 ms, less the acceleration found from
+    /// measured velocities. For a vehicle with a poor velocity measurement and little vibration.
     Always,
 }
 

@@ -1,27 +1,31 @@
-//! The error-state Kalman filter as an estimator: predict, update, gate, inflate, reset.
+//! Error-state Kalman filter ([`Eskf`]): prediction, gated updates, inflation and resets.
 //!
-//! The arithmetic is in [`filter`](crate::filter), the measurement models are in [`aid`](crate::aid), each with the
-//! conditions for its start, continuation, stop and reset. Use this for anything that
-//! flies indoors on an inertial sensor, optical flow and a range; use the
-//! [`Complementary`](crate::Complementary) filter where a few hundred bytes must do.
+//! Use it for a vehicle with an inertial sensor and aiding sensors. Where a few hundred bytes must
+//! do, use [`Complementary`](crate::Complementary). The arithmetic is in [`filter`](crate::filter).
+//! The measurement models, each with the conditions for start, continuation, stop and reset, are in
+//! [`aid`](crate::aid).
 //!
-//! | file | what |
+//! Order of an update: refuse unusable samples, compute the state at the time of the sample,
+//! predict, compute the innovation, test it against the gate, then fuse, reject, or reset after a
+//! lock-out.
+//!
+//! | file | content |
 //! |---|---|
-//! | `eskf.rs` | the filter's state, time alignment and update |
-//! | `eskf/interface.rs` | its [`Estimator`]: initialise, command, predict, estimate |
-//! | `eskf/bridge.rs` | inertial samples that are garbage |
-//! | `eskf/unfelt.rs` | an accelerometer that does not measure |
-//! | `eskf/measurements.rs` | one update a sensor |
-//! | `eskf/external.rs` | position, velocity, attitude from outside; measurements with a model of one's own |
-//! | `eskf/airspeed.rs` | airspeeds and the wind |
-//! | `eskf/alignment.rs` | north, from how a measured velocity changes |
-//! | `eskf/wander.rs` | how much of a receiver's error stays the same |
-//! | `eskf/pseudo_measurements.rs` | updates without a sensor: stationary, gravity, drag, initial heading, unobserved velocity |
-//! | `eskf/resets.rs` | what is put right when the estimate is found wrong: inflation, resets, restarts, health |
-//! | `eskf/gate.rs` | innovation gates, lock-outs, count of resets |
-//! | `eskf/range_gate.rs` | which ranges are compared at all |
-//! | `eskf/fast_turn.rs` | turns that a camera does not follow |
-//! | `eskf/innovation_bias.rs` | test of flow's innovations for a mean that is not zero |
+//! | `eskf.rs` | state of the filter, time alignment, update |
+//! | `eskf/interface.rs` | [`Estimator`]: initialise, command, predict, estimate |
+//! | `eskf/bridge.rs` | corrupt inertial samples |
+//! | `eskf/unfelt.rs` | operation without accelerometer |
+//! | `eskf/measurements.rs` | updates with on-board sensors |
+//! | `eskf/external.rs` | external position, velocity, attitude; measurements with a user's model |
+//! | `eskf/airspeed.rs` | airspeed and wind |
+//! | `eskf/alignment.rs` | heading from the changes of a measured velocity |
+//! | `eskf/wander.rs` | constant part of a receiver's error |
+//! | `eskf/pseudo_measurements.rs` | stationary, gravity, drag, initial heading, unobserved velocity |
+//! | `eskf/resets.rs` | inflation, resets, restarts, health check |
+//! | `eskf/gate.rs` | innovation gates, lock-outs, reset counter |
+//! | `eskf/range_gate.rs` | plausibility of ranges |
+//! | `eskf/fast_turn.rs` | rotation too fast for optical flow |
+//! | `eskf/innovation_bias.rs` | test of the flow innovations for a non-zero mean |
 
 mod airspeed;
 mod alignment;
@@ -64,27 +68,32 @@ use stampfly_types::messages::{
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3, math};
 use wander::Wander;
 
-/// Measurements from farther ahead than this are refused, s.
+/// Largest time by which a measurement may be ahead of the last inertial sample, s.
 const MAX_AHEAD: f32 = 0.02;
-/// Measurements this close in time to the last inertial sample are compared with the present state, s.
+/// Measurements closer in time to the last inertial sample than this are compared with the present
+/// state, s.
 const SIMULTANEOUS: f32 = 0.5e-3;
-/// Longest inertial step that is integrated; a longer gap is a gap.
+/// Longest inertial step that is integrated, s. A longer one is a gap: the step is shortened and
+/// the history cleared.
 const MAX_STEP: f32 = 0.5;
-/// The state is propagated with every inertial sample, the covariance with the first sample after this much time, s: at
-/// 400 Hz with every fourth one, for a quarter of the work. The covariance changes in tenths of seconds. (PX4's EKF2 takes
-/// 10 ms, too: `EKF2_PREDICT_US`.)
+/// Interval between two propagations of the covariance, s. The state is propagated with every
+/// inertial sample, the covariance with the first one after this time: at 400 Hz with every fourth,
+/// for a quarter of the work. The covariance changes within tenths of a second. (EKF2 uses 10 ms,
+/// `EKF2_PREDICT_US`.)
 const COVARIANCE_STEP: f32 = 9e-3;
-/// Largest standard deviation of a velocity that the vehicle brakes by, m/s. Without flow it is seen by drag alone: at 0.4 1/s, a
-/// velocity of 1 m/s is 0.4 m/s², as much as an accelerometer bias or a wind of 1 m/s.
+/// Largest standard deviation of a velocity that is still marked valid when it comes from drag
+/// alone, m/s. At 0.4 1/s a velocity of 1 m/s is 0.4 m/s², as much as an accelerometer bias or a
+/// wind of 1 m/s.
 const BRAKES: f32 = 1.5;
-/// Below this height, m, the ground may carry it, and what it feels is no drag: it comes down level.
+/// Below this height, m, velocity from drag is not used: the ground may carry the vehicle.
 const LEVEL: f32 = 0.12;
-/// A take-off is over after this time: at 0.03 m/s it has risen to where a camera sees.
+/// Duration of a take-off, in which the velocity stays valid without flow: at 0.03 m/s the vehicle
+/// has then reached a height at which the camera works.
 const RISES: Duration = Duration::from_secs(3);
-/// Pseudo-measurements are made on every n-th inertial sample.
+/// Pseudo-measurements are fused with every n-th inertial sample.
 const PSEUDO_MEASUREMENT_DIVIDER: u32 = 4;
 
-/// Mean of the inertial samples between two updates with gravity.
+/// Mean of the inertial samples between two gravity updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Mean {
@@ -98,14 +107,21 @@ impl Mean {
         self.count += 1.0;
     }
 
-    /// The mean, and of how many.
+    /// The mean and the number of samples, and starts again. `None` without samples.
     fn take(&mut self) -> Option<(Vec3, f32)> {
         let Self { sum, count } = core::mem::take(self);
         (count > 0.0).then(|| (sum / count, count))
     }
 }
 
-/// The error-state Kalman filter.
+/// Fifteen-state error-state Kalman filter.
+///
+/// Position and velocity are in world NED, m and m/s; attitude is body → world. 6.5 kB, a third of
+/// it the history for late measurements. See [`Estimator`] for the call order.
+///
+/// # Timing
+/// `predict` costs the same at every sample except that every fourth one at 400 Hz propagates the
+/// covariance. To bound the cost of a step with many new samples use [`Pacer`](crate::Pacer).
 ///
 /// ```
 /// use stampfly_eskf::{Eskf, EskfConfig, Estimator};
@@ -125,8 +141,9 @@ impl Mean {
 /// assert!(estimate.valid.contains(Validity::HEIGHT));
 /// assert!((estimate.height - 0.5).abs() < 0.01);
 /// ```
-// In this order in memory: the covariance, at whose elements all updates look, then what each sample looks at, then what is
-// handed on as a whole. A load reaches 1020 bytes on a Cortex-M4F; the order is worth 3 % of the flight chain there.
+// Memory order, fixed by `repr(C)`: first the covariance, which every update reads, then the fields
+// used by each sample, then those passed on as a whole. A load instruction of a Cortex-M4F reaches
+// 1020 bytes; the order saves 3 % of the instructions of the flight chain there.
 #[repr(C)]
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -134,18 +151,19 @@ pub struct Eskf {
     covariance: Covariance,
     now: Instant,
     baro_updated: Instant,
-    /// That of the configuration, in the units of comparisons: asked for several times an inertial sample.
+    /// `config.aiding_timeout` as a `Duration`, converted once because it is compared several times
+    /// per inertial sample.
     aiding_timeout: Duration,
     config: EskfConfig,
     noise: ProcessNoise,
     state: NominalState,
     command: EstimatorCommand,
-    /// Position of a stationary vehicle, while it is on the ground.
+    /// Position of the stationary vehicle; `None` in flight.
     anchor: Option<Vec3>,
-    /// World down coordinate of the surface below.
+    /// World down coordinate of the surface below, m; `None` until it is known.
     surface: Option<f32>,
     baro_offset: Option<Offset>,
-    /// Direction of the magnetic field, world.
+    /// Direction of the magnetic field, world, unit length.
     field: Option<Vec3>,
     initialized: bool,
     steps: u32,
@@ -153,24 +171,25 @@ pub struct Eskf {
     force: Vec3,
     gates: Gates,
     status: EstimatorStatus,
-    /// Inertial samples over which the covariance has yet to be propagated, and the attitude in which they began.
+    /// Inertial samples over which the covariance has not been propagated yet, and the attitude at
+    /// their start.
     pending_step: PropagationStep,
     pending_rotation: Rotation,
     acceleration: Acceleration,
     accels: Mean,
-    /// The same with [`GravityUse::Always`].
+    /// Mean of the samples since the last covariance step, for [`GravityUse::Always`].
     felt: Mean,
-    /// Of the specific force and of the rate.
+    /// Of specific force and angular rate.
     vibration: [Vibration; 2],
     alignment: Alignment,
     flow_innovation_bias: InnovationBiasMonitor,
     bridge: Bridge,
     range_gate: RangeGate,
-    /// When a range was compared last.
+    /// Time at which a range was last compared with the estimate.
     range_used: Instant,
-    /// In this flight the floor was once far enough away to be seen sharply.
+    /// The distance to the floor has once reached `flow_min_distance` in this flight.
     has_seen_floor: bool,
-    /// When it last left the ground.
+    /// Time at which the vehicle last left the ground.
     stood: Option<Instant>,
     fast_turn: FastTurn,
     findings: SensorFindings,
@@ -180,17 +199,18 @@ pub struct Eskf {
     wander: Wander,
 }
 
-/// The state at the time of a measurement: EKF2's delayed time horizon, computed back for each measurement.
+/// State at the time of a measurement: EKF2's delayed time horizon, computed back for each
+/// measurement.
 struct DelayedState {
     state: NominalState,
     rotation: Rotation,
-    /// Propagation since then.
+    /// Propagation from the measurement to the present.
     step: PropagationStep,
-    /// Age of the measurement, s; zero for the present.
+    /// Age of the measurement, s. Zero for the present.
     age: f32,
 }
 
-/// Position of each sensor in the status message's counters.
+/// Index of each sensor in the counters of the status message.
 #[derive(Clone, Copy)]
 enum Counter {
     Tof = 0,
@@ -201,8 +221,7 @@ enum Counter {
 }
 
 impl Eskf {
-    /// A filter that waits to be initialised.
-    // Made where it stays: a function of its own leaves a copy of 6 kB on the stack of whoever calls it.
+    /// A filter that is not yet initialised.
     #[inline(always)]
     #[must_use]
     pub fn new(config: EskfConfig) -> Self {
@@ -247,8 +266,9 @@ impl Eskf {
         }
     }
 
-    /// Begins again with this configuration, in its place: afterwards it is what [`new`](Self::new) makes, bit for bit. For a vehicle that is given other parameters on
-    /// a small stack, where a second filter of 6 kB has no room.
+    /// Restarts in place with another configuration. Afterwards the filter equals
+    /// [`new`](Self::new)`(config)` bit for bit. For parameter changes on a small stack, where a
+    /// second filter of 6 kB does not fit.
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig};
@@ -257,7 +277,8 @@ impl Eskf {
     /// filter.begin_again(&other);
     /// assert_eq!(filter, Eskf::new(other));
     /// ```
-    // Each field by itself: whatever is added has to be added here, too, and none is copied whole that is large.
+    // The exhaustive pattern makes the compiler report a new field that is not reset here. Large
+    // fields are changed in place and never copied.
     #[inline(never)]
     pub fn begin_again(&mut self, config: &EskfConfig) {
         let Self {
@@ -355,16 +376,17 @@ impl Eskf {
         DelayedState { state: self.state, rotation: self.state.rotation(), step: PropagationStep::default(), age: 0.0 }
     }
 
-    /// Age of a measurement, s. Refuses measurements before initialisation, and those that are not finite, not new, too old or
-    /// from the future. [`state_at`](Self::state_at) follows, and is not part of it: a result that holds a state beside a
-    /// refusal of one byte is copied byte by byte, 700 instructions a measurement.
+    /// Age of a measurement, s. Refuses measurements before initialisation, and those that are not
+    /// finite, not new, too old or too far ahead. [`state_at`](Self::state_at) is a separate call,
+    /// because a `Result` with a state next to a one-byte refusal is copied byte by byte: 700
+    /// instructions per measurement.
     #[inline]
     fn admit(&mut self, sensor: Sensor, at: Instant, values: &[f32]) -> Result<f32, Refusal> {
         let age = self.place_in_time(at, values)?;
         if self.gates.is_new(sensor, at) { Ok(age) } else { Err(Refusal::Repeated) }
     }
 
-    /// The same for measurements of which several may have one stamp.
+    /// The same for sources that may deliver several measurements with one time stamp.
     #[inline]
     fn place_in_time(&self, at: Instant, values: &[f32]) -> Result<f32, Refusal> {
         if !self.initialized {
@@ -383,8 +405,8 @@ impl Eskf {
         Ok(age)
     }
 
-    /// The state at the time of a measurement of this age, s. `None` when the history does not go back so far, as right
-    /// after the start.
+    /// State at the time of a measurement of this age, s. `None` when the history does not reach
+    /// back so far, as right after the start.
     fn state_at(&self, age: f32) -> Option<DelayedState> {
         if age.abs() < SIMULTANEOUS {
             return Some(self.current_state());
@@ -394,7 +416,7 @@ impl Eskf {
         Some(DelayedState { state, rotation: state.rotation(), step, age })
     }
 
-    /// Innovation of a measurement against the state of its time.
+    /// Innovation of a measurement against the state at its time.
     #[inline]
     fn innovation<const M: usize>(
         &self,
@@ -409,13 +431,16 @@ impl Eskf {
             *innovation -= row.predicted;
             *jacobian = row.jacobian;
         }
+        // The rows refer to the state at the time of the measurement, the covariance to the present
+        // state.
         if delayed.age != 0.0 {
             delayed.step.propagate_jacobians(&delayed.rotation, &mut jacobians);
         }
         self.covariance.innovation(&jacobians, innovations, variances)
     }
 
-    /// Test ratio: normalised innovation squared over the gate's. Above one the measurement is outside the gate.
+    /// Test ratio: normalised innovation squared divided by that of the gate. Above one, the
+    /// measurement is outside.
     #[inline]
     fn test_ratio<const M: usize>(&self, innovation: &Innovation<M>) -> f32 {
         innovation.nis() / self.config.gate_distance(M)
@@ -438,7 +463,8 @@ impl Eskf {
         _ = self.update(&innovation, ratio);
     }
 
-    /// What became of a sensor's measurements since this filter was made, restarts included.
+    /// Counters of a sensor's measurements since this filter was constructed; restarts do not clear
+    /// them.
     ///
     /// ```
     /// use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Refusal};
@@ -452,29 +478,29 @@ impl Eskf {
         self.tallies.of(sensor)
     }
 
-    /// Counts what became of a measurement.
+    /// Adds a result to the counters.
     fn tallied(&mut self, sensor: Aiding, fusion: Fusion) -> Fusion {
         self.tallies.add(sensor, fusion);
         fusion
     }
 
-    /// Tests a measurement of a sensor on board against its gate.
+    /// Tests an on-board sensor's measurement against its gate.
     #[inline(always)]
     fn test(&mut self, sensor: Sensor, ratio: f32) -> GateResult {
         self.gates.test(sensor, self.now, ratio, self.config.lockout, self.config.lockout_samples)
     }
 
-    /// Is north where this filter has it? The nose's north always is.
+    /// Whether the heading is known. With [`StartHeading::Nose`] it always is.
     fn is_north_known(&self) -> bool {
         !self.alignment.is_sought()
     }
 
-    /// Does something from outside show horizontal position or velocity, or the vertical ones?
+    /// Whether an external measurement of this sensor was accepted within `aiding_timeout`.
     fn is_aided_outside(&self, sensor: Sensor) -> bool {
         self.gates.is_recent_within(sensor, self.now, self.aiding_timeout)
     }
 
-    /// Counts a measurement in the status.
+    /// Counts a measurement in the status message and in the counters.
     fn count(&mut self, counter: Counter, fusion: Fusion) -> Fusion {
         let sensor = match counter {
             Counter::Tof => Aiding::Tof,
@@ -495,19 +521,19 @@ impl Eskf {
         fusion
     }
 
-    /// Is the velocity measured, or held by the zero-velocity update?
+    /// Whether the velocity is measured, or held by the zero-velocity update.
     fn is_velocity_aided(&self) -> bool {
         let flow = self.gates.is_recent(Sensor::Flow, self.now) && !self.findings.flow.is_left_out();
         self.anchor.is_some() || flow || self.is_aided_outside(Sensor::Level)
     }
 
-    /// Has it left the ground, where it stood still, so lately that it knows its velocity without a
-    /// camera? That sees nothing of the first centimetres.
+    /// Whether the vehicle left the ground within the duration of a take-off. Its velocity is then
+    /// still known from standing; the camera sees nothing in the first centimetres.
     fn has_just_risen(&self) -> bool {
         self.stood.is_some_and(|stood| self.now.since(stood) < RISES) && !self.findings.flow.is_left_out()
     }
 
-    /// Says in the status how uncertain motion and gyro are.
+    /// Copies the uncertainties of motion and gyro into the status message.
     fn publish_sigmas(&mut self) {
         self.status.acceleration_sigma = self.acceleration_sigma();
         self.status.velocity_sigma = self.larger_sigma(VELOCITY);
@@ -516,8 +542,9 @@ impl Eskf {
         self.status.yaw_bias_sigma = self.sigma(GYRO_BIAS + 2);
     }
 
-    /// Standard deviation of the acceleration along body x and y of a vehicle that its thrust carries,
-    /// m/s²: a turn about y or x takes gravity there, and an accelerometer's bias is one.
+    /// Standard deviation of the acceleration along body x and y of a vehicle carried by its
+    /// thrust, m/s²: a rotation about y or x shifts gravity into that axis, and the accelerometer
+    /// bias is added.
     fn acceleration_sigma(&self) -> f32 {
         let variance = |turn: usize, axis: usize, sign: f32| {
             let p = |i: usize, j: usize| self.covariance.get(i, j);
@@ -527,7 +554,8 @@ impl Eskf {
         math::sqrt(math::larger(math::larger(variance(1, 0, 1.0), variance(0, 1, -1.0)), 0.0))
     }
 
-    /// One standard deviation of the state whose part along x has this index, the larger of x and y.
+    /// Larger standard deviation of the x and y components of a state; `x` is the index of the x
+    /// component.
     fn larger_sigma(&self, x: usize) -> f32 {
         let [x, y] = [x, x + 1].map(|index| self.covariance.get(index, index));
         math::sqrt(math::larger(math::larger(x, y), 0.0))
@@ -538,29 +566,29 @@ impl Eskf {
         math::sqrt(math::larger(self.covariance.get(index, index), 0.0))
     }
 
-    /// Does drag show the velocity? Only where nothing else does.
+    /// Whether drag is used as a velocity measurement: only while no sensor measures velocity.
     fn feels_drag(&self) -> bool {
         self.config.drag > 0.0 && !self.command.accel_faulty && self.command.flying && !self.is_velocity_aided()
     }
 
-    /// Is the horizontal velocity known well enough to brake by it?
+    /// Whether the horizontal velocity is certain enough to be marked valid without a sensor.
     fn is_velocity_certain(&self) -> bool {
         let variance = |axis: usize| self.covariance.get(VELOCITY + axis, VELOCITY + axis);
         variance(0).max(variance(1)) < BRAKES * BRAKES
     }
 
-    /// Height above the surface; a surface that is not known is where the vehicle would stand.
+    /// Height above the surface, m. An unknown surface counts as one ground clearance below the
+    /// origin.
     fn height(&self) -> f32 {
         self.surface.unwrap_or(self.config.ground_clearance) - self.state.position.z
     }
 
-    /// Does a range hold the height?
+    /// Whether a range holds the height.
     fn is_range_aided(&self) -> bool {
         self.gates.is_recent(Sensor::Tof, self.now) && !self.findings.range.is_left_out()
     }
 
-    /// Updates without a sensor of position or velocity. The conditions are listed in `pseudo_measurements.rs`.
-    // Once in four steps or more: apart, so that the code of every step is short and can be kept in fast memory.
+    /// Applies the pseudo-measurements. Their conditions are listed in `pseudo_measurements.rs`.
     #[inline(never)]
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
         if self.command.accel_faulty {
@@ -594,7 +622,7 @@ fn initial_covariance(config: &EskfConfig) -> Covariance {
     Covariance::from_sigmas(initial_sigmas(config))
 }
 
-/// Of position, velocity, attitude and both biases.
+/// Of position, velocity, attitude, gyro bias and accelerometer bias.
 const fn initial_sigmas(config: &EskfConfig) -> [f32; 5] {
     [
         config.initial_position,

@@ -1,8 +1,9 @@
-//! The attitude that gravity shows: roll and pitch from a specific force, heading zero.
+//! Roll and pitch from a measured specific force; heading zero.
 
 use stampfly_types::{Vec3, math};
 
-/// Quaternion (w, x, y, z; body → world) whose up axis is the measured specific force. Level for a force of zero.
+/// Quaternion (w, x, y, z; body → world) whose up axis is the measured specific force. Returns the
+/// level attitude for a force of at most 0.1 m/s² or NaN.
 ///
 /// ```
 /// use stampfly_eskf::attitude_from_specific_force;

@@ -1,13 +1,14 @@
-//! What an estimator is given in one step, and the one order in which it is given.
+//! The samples of one step ([`Measurements`]) and the order in which an estimator receives them
+//! ([`feed`]).
 //!
-//! A vehicle, a replay over recorded data, a bench and a consistency test must feed an estimator alike, or they measure
-//! something else than what flies. They all call [`feed`].
+//! Vehicle, replay, benchmark and consistency tests all call [`feed`], so that they exercise the
+//! estimator in the same order as in flight.
 
 use crate::estimator::{Estimator, Fusion};
 use stampfly_types::messages::{BaroData, ExternalPose, FlowData, ImuData, MagData, TofData};
 use stampfly_types::{Instant, Stamped, Vec3};
 
-/// The samples since the last step, each list oldest first.
+/// The samples since the last step. Each list is sorted, oldest first.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Measurements<'a> {
     /// Inertial samples.
@@ -20,11 +21,11 @@ pub struct Measurements<'a> {
     pub mag: &'a [Stamped<MagData>],
     /// Air pressure.
     pub baro: &'a [Stamped<BaroData>],
-    /// Pose seen from outside. A standard deviation of zero means that part is not given.
+    /// Poses from outside. A standard deviation of zero means that this part is absent.
     pub pose: &'a [Stamped<ExternalPose>],
 }
 
-/// Where a measurement came from.
+/// Source of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Aiding {
@@ -36,20 +37,20 @@ pub enum Aiding {
     Mag,
     /// Barometer.
     Baro,
-    /// Position seen from outside.
+    /// External position.
     Position,
-    /// Attitude seen from outside.
+    /// External attitude.
     Attitude,
-    /// Velocity seen from outside.
+    /// External velocity.
     Velocity,
-    /// Gravity as the vertical, which the filter asks its accelerometer for.
+    /// Gravity, an update that the filter makes from its own accelerometer samples.
     Gravity,
-    /// A measurement with a model of the user's ([`Eskf::fuse`](crate::Eskf::fuse)).
+    /// A measurement with a user's model ([`Eskf::fuse`](crate::Eskf::fuse)).
     Own,
 }
 
-/// Feeds an estimator: first the inertial samples, then the others, sensor by sensor. `fused` is told what became of each
-/// measurement.
+/// Feeds an estimator: first the inertial samples, then the others, sensor by sensor. `fused` is
+/// called with the result of each measurement.
 ///
 /// ```
 /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, Measurements, feed};
@@ -70,6 +71,8 @@ pub fn feed<E: Estimator + ?Sized>(
     mut fused: impl FnMut(Aiding, Instant, Fusion),
 ) {
     let Measurements { imu, tof, flow, mag, baro, pose } = measurements;
+    // Inertial samples first: every measurement is compared with a state that has been propagated
+    // past it.
     for sample in *imu {
         estimator.predict(sample.at, &sample.data);
     }

@@ -1,22 +1,26 @@
-//! Field and pressure wait for a step with time: what a step may cost does not depend on how many sensors answer at once.
+//! Spreads magnetometer and barometer updates over steps, to bound the execution time of a step.
 //!
-//! Aiding sensors are slower than the loop, and now and then all of them have something new in the same step. An estimator that is given
-//! all of it takes three times as long as usual for that step, and the worst step is what a loop's period has to hold. A [`Pacer`]
-//! lets the magnetometer and the barometer wait for a step in which nothing else is fused: 5 ms at most at the StampFly's rates. Their
-//! samples are compared with the state of their own time then, as late samples are. Range and flow do not wait, for they hold
-//! the vehicle: with ranges that came 2.5 ms later, one of two thousand faulted flights ended elsewhere.
+//! Aiding sensors are slower than the loop, and now and then all of them have a new sample in the
+//! same step. Fusing all of them takes three times as long as usual, and the period of the loop has
+//! to hold the longest step. A [`Pacer`] delays magnetometer and barometer until a step in which
+//! nothing else is fused: at most 5 ms at the StampFly's rates. The filter then compares the
+//! samples with the state at their own time, as it does with late samples. Range and flow are not
+//! delayed, because they hold the position: with ranges 2.5 ms later, one of two thousand
+//! fault-injection flights ended differently.
 //!
-//! For a loop with a deadline. Not for replays that compare estimators, or where nobody waits: [`feed`] is simpler.
+//! Use it in a loop with a deadline. For replays, estimator comparisons and loops without a
+//! deadline use [`feed`].
 
 use crate::estimator::{Estimator, Fusion};
 use crate::measurements::{Aiding, Measurements, feed};
 use stampfly_types::messages::{BaroData, MagData};
 use stampfly_types::{Instant, Stamped};
 
-/// Feeds an estimator so that the slow measurements have steps of their own.
+/// Feeds an estimator, with magnetometer and barometer updates in steps of their own.
 ///
-/// Inertial samples, ranges, optical flow and poses from outside go in at once. A field or a pressure waits for a step without any
-/// aiding, or until the next sample of its own kind comes: none is left out, and those of a sensor stay in order.
+/// Inertial samples, ranges, optical flow and external poses are passed on at once. A magnetometer
+/// or barometer sample waits for a step without any other aiding, or until the next sample of its
+/// own sensor arrives. No sample is dropped, and the samples of one sensor stay in order.
 ///
 /// ```
 /// use stampfly_eskf::{Aiding, Eskf, EskfConfig, Estimator, Measurements, Pacer};
@@ -44,7 +48,8 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Feeds the samples since the last step. `fused` is told what became of each measurement, in the step in which it was used.
+    /// Feeds the samples since the last step. `fused` is called with the result of each measurement
+    /// in the step in which it is fused.
     pub fn feed<E: Estimator + ?Sized>(
         &mut self,
         estimator: &mut E,
@@ -63,7 +68,8 @@ impl Pacer {
     }
 }
 
-/// Fuses what waits, if there is time, and whatever must not wait any longer.
+/// Fuses the waiting sample if the step is free, and at once if a newer sample of the sensor has
+/// arrived.
 #[inline]
 fn next<T: Copy>(
     waiting: &mut Option<Stamped<T>>,
@@ -92,7 +98,7 @@ mod tests {
     use stampfly_types::messages::*;
     use std::vec::Vec;
 
-    /// Writes down what it is given.
+    /// An estimator that records what it receives.
     #[derive(Default)]
     struct Given(Vec<(Aiding, Instant)>);
 
@@ -136,7 +142,7 @@ mod tests {
             .collect()
     }
 
-    /// One step, with so many new samples of each sensor. Returns what is fused in it.
+    /// One step with the given number of new samples of each sensor. Returns what is fused in it.
     fn step(pacer: &mut Pacer, now: Instant, [tof, flow, mag, baro]: [usize; 4]) -> Vec<(Aiding, Instant)> {
         let mut given = Given::default();
         let (tof, flow) = (samples(now, tof), samples(now, flow));
@@ -154,7 +160,8 @@ mod tests {
         let mut fused = 0;
         for n in 0..4_000u64 {
             let now = Instant::from_micros(n * 2_500);
-            // Flow at 100 Hz, range at 33, field and pressure at 25: all of them together every 48 steps.
+            // Flow at 100 Hz, range at 33, field and pressure at 25: all of them coincide every 48
+            // steps.
             let new = [12, 4, 16, 16].map(|period| usize::from(n.is_multiple_of(period)));
             let told = step(&mut pacer, now, new);
             let waits = |from: &Aiding| matches!(from, Aiding::Mag | Aiding::Baro);

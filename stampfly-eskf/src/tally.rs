@@ -1,36 +1,36 @@
-//! What became of each sensor's measurements, and why: readable at any time, without the answers.
+//! Counters of measurement results, by sensor and reason.
 //!
-//! For a telemetry page, a check before the start and the question why the estimate does not follow the receiver. The answers
-//! themselves ([`Fusion`]) say it for one measurement; the estimator's message has room for five sensors and no reasons.
+//! Use them for telemetry, pre-flight checks and diagnosis. [`Fusion`] reports a single
+//! measurement; `EstimatorStatus` has room for five sensors and no reasons.
 
 use crate::estimator::{Fusion, Refusal};
 use crate::measurements::Aiding;
 
-/// Number of reasons to refuse a measurement, and of sensors.
+/// Number of reasons for a refusal, and of sensors.
 const REASONS: usize = Refusal::NotUsed as usize + 1;
 const SENSORS: usize = Aiding::Own as usize + 1;
 
-/// Counts of one sensor since the estimator was made; each stays at its largest value.
+/// Counters of one sensor since the estimator was constructed. They saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tally {
-    /// Went into the estimate.
+    /// Measurements fused into the estimate.
     pub fused: u32,
-    /// Left out by the gate.
+    /// Measurements rejected by the gate.
     pub gated: u32,
-    /// The estimate was moved to it.
+    /// Resets of the state to this sensor.
     pub resets: u32,
     refused: [u16; REASONS],
 }
 
 impl Tally {
-    /// How many were refused for this reason; ends at 65535.
+    /// Number of refusals for this reason; saturates at 65535.
     #[must_use]
     pub fn refused(&self, reason: Refusal) -> u32 {
         self.refused.get(reason as usize).copied().map_or(0, u32::from)
     }
 
-    /// How many were refused for any reason.
+    /// Number of refusals for all reasons.
     #[must_use]
     pub fn all_refused(&self) -> u32 {
         self.refused.iter().copied().map(u32::from).sum()
@@ -52,7 +52,7 @@ impl Tally {
     }
 }
 
-/// The tallies of all sensors.
+/// Counters of all sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Tallies {

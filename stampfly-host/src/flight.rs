@@ -1,7 +1,8 @@
-//! A flight as columns over time: what plots, metrics and exports work on.
+//! A flight as columns over time, for plots, metrics and exports.
 //!
-//! Comes from a log ([`crate::flight_log`]), from a recording ([`crate::dataset`]) or message by message from a
-//! simulation. Not for replay: numbers are `f64` here, so 64-bit counters beyond 2⁵³ are rounded.
+//! It comes from a log ([`crate::flight_log`]), from a recording of the repository's `lab`, or message
+//! by message from a simulation. Numbers are `f64`, so 64-bit counters beyond 2⁵³ are rounded: for a
+//! replay use the log itself.
 
 use stampfly_types::{FieldInfo, FieldKind, Instant, Message, Value, leaves};
 use std::collections::BTreeMap;

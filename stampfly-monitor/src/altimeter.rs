@@ -1,53 +1,54 @@
-//! Height and climb rate by accelerometer and barometer, in which no range finder has a part.
+//! Height and climb rate by accelerometer and barometer, independent of the range finder.
 //!
-//! An observer of height, climb rate and accelerometer bias integrates the vertical acceleration and
-//! follows the barometer slowly. Its three poles lie at one place.
+//! An observer of height, climb rate and accelerometer bias integrates the vertical acceleration
+//! and follows the barometer slowly. Its three poles coincide.
 //!
-//! Neither of the two is good alone. Vibration moves the accelerometer's zero by 2 m/s² as the thrust
-//! changes. A door moves the pressure by 18 Pa within a second, which is 1.5 m, and propellers press
-//! or suck. But no vehicle moves so without feeling it: where the observer does not follow the
-//! barometer, the pressure has changed, and both begin anew from there.
+//! Neither sensor suffices alone. Vibration shifts the accelerometer's zero by up to 2 m/s² as the
+//! thrust changes. A door changes the pressure by 18 Pa within a second, which is 1.5 m, and
+//! propellers change it, too. No vehicle moves like that without measuring it: if the observer does
+//! not follow the barometer, the pressure has changed, and both restart from there.
 
 use stampfly_types::math;
 
-/// Time constants with which the observer follows the barometer, s: slower at first, because starting
-/// propellers change the pressure by more than half a metre.
+/// Time constants with which the observer follows the barometer, s. The slower one holds for the
+/// first `FIRST` seconds, because starting propellers change the pressure by more than half a
+/// metre.
 const FOLLOWS: f32 = 1.0;
 const FOLLOWS_FIRST: f32 = 3.0;
 const FIRST: f32 = 2.0;
-/// Time constant with which its bias follows the estimator's while nothing disagrees, s.
+/// Time constant with which the bias follows the estimator's while no finding exists, s.
 const BIAS_FOLLOWS: f32 = 1.0;
 /// The same for the climb rate, until the observer has settled.
 const CLIMB_FOLLOWS: f32 = 1.0;
-/// It has settled so long after the take-off, s, because starting propellers change the pressure.
+/// Settling time after the take-off, s, because starting propellers change the pressure.
 const SETTLED: f32 = 4.0;
-/// As much later after a start in the air, s: first the estimator has to find tilt and biases.
+/// Additional time after a start in the air, s, in which the estimator finds tilt and biases.
 const UNKNOWN: f32 = 6.0;
-/// The barometer disagrees with the accelerometer when the mean over this time, s, of what the
-/// observer does not follow is so large, m: five standard deviations of it.
+/// The barometer disagrees with the accelerometer if the mean residual over `DISAGREES_OVER`, s,
+/// exceeds `DISAGREES`, m: five of its standard deviations.
 const DISAGREES_OVER: f32 = 0.3;
 const DISAGREES: f32 = 0.25;
-/// For so long the pressure may go on changing, s.
+/// Time for which the pressure may continue to change, s.
 const SETTLES: f32 = 2.0;
-/// A climb that is felt leaves less than this of an altitude unfollowed, m.
+/// Largest residual of an altitude in a real climb, m.
 const PRESSURE_STEP: f32 = 0.8;
-/// Time constant with which the place where the vehicle stands is followed, s.
+/// Time constant of the altitude of the place where the vehicle stands, s.
 const STANDS: f32 = 0.3;
-/// Two readings are at most so far apart, s.
+/// Upper bound on the interval between readings, s.
 const LONGEST: f32 = 0.2;
-/// Altitudes running that are equal are no measurements any more.
+/// Number of consecutive equal altitudes that indicates a frozen barometer.
 const REPEATED: u32 = 15;
 
-/// An altitude that came in a step.
+/// An altitude of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AltitudeReading {
-    /// How much higher than the one before, m.
+    /// Change since the last one, m.
     pub change: f32,
-    /// How long after it, s.
+    /// Time since the last one, s.
     pub dt: f32,
-    /// The barometer repeats itself.
+    /// The barometer is frozen.
     pub stuck: bool,
-    /// The pressure has changed, and not the height.
+    /// The pressure has stepped; the height has not.
     pub stepped: bool,
 }
 
@@ -55,50 +56,50 @@ pub struct AltitudeReading {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Altimeter {
-    /// Above where the vehicle stood or the observer began, m.
+    /// Above the place where the vehicle stood or the observer started, m.
     pub height: f32,
     /// Upwards, m/s.
     pub climb: f32,
     /// Bias of the upward acceleration, m/s².
     pub bias: f32,
-    /// How long it has run, s; negative while a start in the air is young.
+    /// Running time, s. Negative for the first seconds after a start in the air.
     age: f32,
-    /// Its zero is not where the vehicle stood.
+    /// Its zero is not the place where the vehicle stood.
     restarted: bool,
     /// Altitude of the barometer at the observer's zero, m.
     zero: Option<f32>,
     last: Option<f32>,
     repeats: u32,
-    /// Mean of what the observer does not follow of the altitude, m.
+    /// Mean residual of the altitude, m.
     unfollowed: f32,
 }
 
 impl Altimeter {
-    /// Of a vehicle in the air, of which nothing is known.
+    /// The observer of a vehicle in the air in an unknown state.
     #[must_use]
     pub fn airborne() -> Self {
         Self { age: -UNKNOWN, restarted: true, ..Self::default() }
     }
 
-    /// Has it run for so long that it says something?
+    /// Whether it has run for the settling time.
     #[must_use]
     pub fn has_settled(&self) -> bool {
         self.age > SETTLED
     }
 
-    /// Has the estimator that it watches found itself, after a start in the air?
+    /// Whether the estimator has had time to converge after a start in the air.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.age > 0.0
     }
 
-    /// Does its height count from where the vehicle stood, and not long ago?
+    /// Whether its height refers to the place where the vehicle stood, shortly after the take-off.
     #[must_use]
     pub fn knows_take_off(&self) -> bool {
         self.age < SETTLED && !self.restarted
     }
 
-    /// Has an altitude ever come?
+    /// Whether an altitude has ever been received.
     #[must_use]
     pub fn has_zero(&self) -> bool {
         self.zero.is_some()
@@ -109,13 +110,13 @@ impl Altimeter {
         *self = Self { bias, zero: self.zero, last: self.last, repeats: self.repeats, ..Self::default() };
     }
 
-    /// Begins anew in the air, with this bias, m/s².
+    /// Restarts in the air, with this bias, m/s².
     pub fn restart(&mut self, bias: f32) {
         *self = Self { bias, last: self.last, repeats: self.repeats, ..Self::airborne() };
     }
 
-    /// Goes on by `dt` seconds, in which the upward velocity changed by this much, no bias removed,
-    /// m/s. `believed`: the estimator's climb rate and bias, where its range is not in doubt.
+    /// Propagates by `dt` seconds with a change of the upward velocity by `change`, m/s, bias
+    /// included. `believed`: climb rate and bias of the estimator while its range is accepted.
     pub fn predict(&mut self, dt: f32, change: f32, believed: Option<[f32; 2]>) {
         let change = change - self.bias * dt;
         self.height += (self.climb + 0.5 * change) * dt;
@@ -124,13 +125,14 @@ impl Altimeter {
         if let Some([climb, bias]) = believed {
             self.bias += (bias - self.bias) * (dt / BIAS_FOLLOWS);
             if self.age < SETTLED {
-                // Starting propellers change the pressure and the accelerometer's zero; the range is what is left.
+                // Starting propellers disturb both the pressure and the accelerometer; only the
+                // range remains.
                 self.climb += (climb - self.climb) * (dt / CLIMB_FOLLOWS);
             }
         }
     }
 
-    /// Takes an altitude, m, `dt` seconds after the last.
+    /// Takes an altitude, m, `dt` seconds after the last one.
     pub fn baro(&mut self, altitude: f32, dt: f32, stands: bool) -> AltitudeReading {
         let dt = math::smaller(dt, LONGEST);
         let last = self.last.replace(altitude).unwrap_or(altitude);
@@ -145,7 +147,7 @@ impl Altimeter {
         } else if off.abs() > PRESSURE_STEP || self.age > SETTLED && self.unfollowed.abs() > DISAGREES {
             *zero += off;
             stepped = true;
-            // As after a start, but for the zero.
+            // Settle again as after a take-off, but from another zero.
             if self.age > SETTLED {
                 (self.age, self.restarted, self.unfollowed) = (SETTLED - SETTLES, true, 0.0);
             }
@@ -166,7 +168,7 @@ mod tests {
 
     const DT: f32 = 0.04;
 
-    /// Flies for so many seconds from the ground on; altitude and acceleration are functions of time.
+    /// A flight of `seconds` from the ground; altitude and acceleration are functions of time.
     fn fly(seconds: f32, altitude: impl Fn(f32) -> f32, acceleration: impl Fn(f32) -> f32) -> (Altimeter, u32) {
         let (mut altimeter, mut steps) = (Altimeter::default(), 0);
         for _ in 0..50 {

@@ -1,89 +1,93 @@
-//! The thresholds that belong to a vehicle and its sensors, with units in their names and where they
-//! come from. What belongs to one hypothesis alone stands beside it, as a constant.
+//! Thresholds that depend on the vehicle and its sensors. Each name ends with its unit; each
+//! comment states the origin. Thresholds of a single hypothesis are constants in its file.
 
-/// Thresholds. The defaults are for a multirotor of a palm's size with a camera for optical flow, a
-/// time-of-flight ranger and a barometer.
+/// Thresholds of the monitor. The defaults are for a palm-sized multirotor with a camera for
+/// optical flow, a time-of-flight range finder and a barometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MonitorConfig {
-    /// Bits of [`HYPOTHESES`](crate::HYPOTHESES) that are not asked: to find out what each is worth.
+    /// Bit mask of the [`HYPOTHESES`](crate::HYPOTHESES) that are disabled, to measure the effect
+    /// of each one.
     pub without: u16,
-    /// Height of the range finder on a vehicle that stands, m. An airframe value.
+    /// Height of the range finder while the vehicle stands, m. A property of the airframe.
     pub ground_clearance_m: f32,
 
-    /// Residuals are compared with so many standard deviations. In two axes 5 are exceeded with a
-    /// probability of 4·10⁻⁶, once in a day and a half of independent half seconds.
+    /// Gate for residuals, in standard deviations. In two axes, 5 are exceeded with a probability
+    /// of 4·10⁻⁶: once in a day and a half of independent half-second intervals.
     pub gate_sigmas: f32,
-    /// And for so long: a single reading is not enough.
+    /// Time for which a residual must exceed the gate, s, so that a single reading is not enough.
     pub lasts_s: f32,
 
-    /// Standard deviation of the velocity with which a reckoner begins, m/s.
+    /// Initial standard deviation of a reckoner's velocity, m/s.
     pub velocity_sigma_m_s: f32,
-    /// Standard deviation of the accelerometer's zero along a horizontal axis, m/s², beside what the
-    /// estimator says of its acceleration: what it moves by within seconds.
+    /// Standard deviation of the accelerometer's bias along a horizontal axis, m/s²: its change
+    /// within seconds, added to the estimator's own acceleration uncertainty.
     pub accel_sigma_m_s2: f32,
-    /// Full scale of the accelerometer, m/s²: what has been near it may have been more.
+    /// Full scale of the accelerometer, m/s². A reading near it may have been clipped.
     pub accel_full_scale_m_s2: f32,
-    /// Share of the accelerometer's root mean square change from sample to sample by which its mean is
-    /// wrong: of 4 m/s², as recorded, 0.06 m/s².
+    /// Error of the accelerometer's mean as a share of its root mean square sample-to-sample
+    /// change. A recorded change of 4 m/s² gives 0.06 m/s².
     pub vibration_share: f32,
-    /// Standard deviation of a gyro's scale and axes, share of the angle that it has turned by: data
+    /// Standard deviation of the gyro's scale and axis errors, as a share of the angle turned. Data
     /// sheets allow three of them.
     pub gyro_scale: f32,
 
-    /// Error of a picture's scale from one specimen to the next, share of the velocity. Recorded
-    /// cameras lie between 0.79 and 1.11 of the true one; what the first lacks beyond this is within
-    /// the rest of the gate up to 5 m/s.
+    /// Scale error of flow between specimens, as a share of the velocity. Recorded cameras have
+    /// scales of 0.79 to 1.11; the part beyond this value fits into the rest of the gate up to 5
+    /// m/s.
     pub flow_scale: f32,
-    /// Share of the picture's motion that a single reading may be wrong by, once it is smoothed: a
-    /// PMW3901 takes 121 pictures a second and is read 100 times, so a reading holds one picture, two
-    /// or none. Of two readings that follow each other with an error of all of the motion a quarter
-    /// comes through the smoothing.
+    /// Error of a single reading after smoothing, as a share of the image motion. A PMW3901 takes
+    /// 121 frames a second and is read 100 times, so a reading holds one frame, two or none. For
+    /// two successive readings that are wrong by all of the motion, a quarter remains after
+    /// smoothing.
     pub flow_frame_share: f32,
-    /// How much older than expected a picture is at most, s: cameras need 4 to 12 ms, 4 are expected.
+    /// Largest additional delay of a frame, s. Cameras take 4 to 12 ms, of which 4 are expected.
     pub flow_late_s: f32,
-    /// Standard deviation of a smoothed rate of the picture, rad/s: a count in 10 ms is 0.22, evenly
-    /// distributed 0.063, of which six readings leave 0.026; features as much again.
+    /// Standard deviation of the smoothed image rate, rad/s. One count in 10 ms is 0.22, uniformly
+    /// distributed 0.063, of which 0.026 remain after six readings; the features of the surface add
+    /// as much again.
     pub flow_rate_sigma_rad_s: f32,
-    /// Time constant of that smoothing, s: six readings.
+    /// Time constant of the smoothing, s: six readings.
     pub flow_smooth_s: f32,
-    /// Nearer to the floor, m, the picture may be blurred.
+    /// Distance to the floor, m, below which the image may be blurred.
     pub flow_sharp_m: f32,
-    /// To be used again flow has to agree with a motion of this much, m/s,
+    /// Reckoned change of velocity with which flow must agree to be used again, m/s.
     pub flow_motion_m_s: f32,
-    /// for so long, s.
+    /// Duration of that agreement, s.
     pub flow_agrees_s: f32,
 
-    /// To be used again a range has to lie where it is expected for so long, s.
+    /// Time for which a range must agree with the estimate to be used again, s.
     pub range_agrees_s: f32,
 
-    /// Readings running of one value that a camera gives only when it hangs: 0.4 s of them.
+    /// Number of consecutive equal readings, not zero, that indicates a frozen camera: 0.4 s.
     pub flow_repeats: u32,
-    /// Readings running of zero that show nothing,
+    /// Number of consecutive zero readings after which `FlowStill` is tested.
     pub flow_zeros: u32,
-    /// while the body turns by this much, rad: three counts of a PMW3901,
+    /// Rotation during the zero readings that a camera must show, rad: three counts of a PMW3901.
     pub flow_turn_rad: f32,
-    /// and would have to move by this much, m, to keep the picture still: 5 mm in a fifth of a second
-    /// are as much as 1.5° of tilt.
+    /// Translation that could have cancelled that rotation in the image, m. A larger one is
+    /// excluded: 5 mm in a fifth of a second correspond to a tilt of 1.5°.
     pub flow_motion_m: f32,
-    /// Largest rate of the picture of a vehicle that stands, rad/s: people walk by, and lamps flicker.
+    /// Largest image rate of a vehicle at rest, rad/s, to allow for people walking by and
+    /// flickering lamps.
     pub flow_standing_rad_s: f32,
-    /// Time constant of that rate's mean, s.
+    /// Time constant of the mean image rate, s.
     pub flow_standing_s: f32,
-    /// Largest change of the velocity within 0.15 s that no sensor has felt, m/s: an acceleration of
-    /// 1.3 m/s² that is wrong.
+    /// Largest change of velocity within 0.15 s that is not measured by the accelerometer, m/s: an
+    /// acceleration error of 1.3 m/s².
     pub flow_jump_m_s: f32,
-    /// The same for each metre of distance: what the means of five readings are noisy by.
+    /// Addition per metre of distance, rad/s: the noise of the mean of five readings.
     pub flow_jump_rad_s: f32,
 
-    /// Smallest jump of a gyro's zero from one sample to the next, rad/s: what is smaller can be found
-    /// as a shift, while it has tilted the vehicle by some degrees.
+    /// Smallest jump of the gyro's zero between samples, rad/s. Smaller ones are found later as a
+    /// shift, after some degrees of tilt error.
     pub gyro_jump_rad_s: f32,
-    /// The same in root mean squares of the gyro's change from sample to sample.
+    /// The same in root mean squares of the gyro's sample-to-sample change.
     pub gyro_jump_rms: f32,
-    /// Largest shift of a gyro's zero that is looked for in the air, rad/s: a larger one is a jump.
+    /// Largest shift of the gyro's zero that is fitted in flight, rad/s. A larger one is a jump.
     pub gyro_shift_rad_s: f32,
-    /// Smallest shift of the zero on the ground, rad/s: 3°/s, 6° until a take-off two seconds later.
+    /// Smallest shift of the zero that is detected on the ground, rad/s: 3°/s, which is 6° at a
+    /// take-off two seconds later.
     pub gyro_standing_rad_s: f32,
 }
 

@@ -1,123 +1,124 @@
-//! How the difference between the camera's velocity and a reckoner's has grown, and what explains it.
+//! The difference between camera velocity and dead reckoning over time (the "course"), and fits
+//! that explain it.
 //!
-//! With a gyro's zero that is too high by b since the time t₀, at the distance d, a sound camera's
-//! velocity less the reckoned one is, turned by a quarter about the vertical,
+//! If the gyro's zero is too high by b since the time t₀, at the distance d, a healthy camera's
+//! velocity minus the reckoned one is, rotated by a quarter turn about the vertical,
 //!
 //! ```text
 //! b·(g·(t − t₀)²/2 − d)
 //! ```
 //!
-//! because the reckoned tilt grows, and because the rotation that the camera is compensated for is
-//! wrong. A camera that is at fault makes another course: axes that are reversed, swapped or dead
-//! make a multiple of what the picture should show, an offset of its motion a multiple of the
-//! distance. To each of them a line is added, for a tilt that was wrong from the beginning; how much,
-//! the reckoner says. A burst of the gyro turns the reckoned tilt once: it makes a line that begins
-//! then, and one point beside it, whose picture is compensated for the burst.
+//! because the reckoned tilt grows, and because the rotation compensation of the camera is wrong. A
+//! faulty camera gives another course: reversed, swapped or dead axes a multiple of the expected
+//! image velocity, an offset of the motion a multiple of the distance. To each of them a line is
+//! added, for a tilt error at the start of the reckoner, limited by the reckoner's uncertainty. A
+//! burst of the gyro rotates the reckoned tilt once: it gives a line from then on, and one outlier
+//! whose image was compensated with the burst.
 //!
-//! Each explanation is fitted by least squares, for each t₀. What it leaves says how good it is.
+//! Each explanation is fitted by least squares for each t₀. The residual measures its quality.
 
 use stampfly_types::{GRAVITY, math};
 
-/// Length of a point, s, and how many there are: as long as a reckoner lasts.
+/// Duration of a point, s, and number of points: together the lifetime of a reckoner.
 const STRETCH: f32 = 0.125;
 const POINTS: usize = 24;
-/// Deviations of the reckoner's acceleration that a line may stand for.
+/// Largest slope of the line, in standard deviations of the reckoner's acceleration.
 const TILT_SIGMAS: f32 = 2.0;
-/// A shift has up to three numbers an axis: it needs so many points since t₀, and so many in all. A
-/// burst has two, and a fault of the camera none.
+/// Smallest number of points since t₀ for a shift (up to three parameters per axis), a burst (two),
+/// any of the two in all, and a camera fault (none).
 const SHORTEST: usize = 6;
 const SHORTEST_BURST: usize = 4;
 const ENOUGH: usize = 9;
 const SHORTEST_FAULT: usize = 3;
-/// Share of the course's scatter that a shift may leave beside noise: a course of eight points with
-/// its own noise at a third of the gate.
+/// Share of the course's scatter that a fit may leave in addition to noise: that of eight points
+/// whose own noise is a third of the gate.
 const LEFT: f32 = 0.07;
-/// So many times its noise may be left of a course: of a dozen points in two axes three standard
-/// deviations above the mean.
+/// Factor of the noise that may remain: three standard deviations above the mean for a dozen points
+/// in two axes.
 const NOISES: f32 = 2.0;
-/// Nothing is fitted to what is smaller than so many times the noise: one point that is wrong makes as
-/// much of a dozen.
+/// Factor of the noise below which a course is too small for a fit: a single wrong point among a
+/// dozen produces as much.
 const LARGE: f32 = 6.0;
-/// So many times as much as the better of two explanations the other one has to leave.
+/// Factor by which the residual of the second-best explanation must exceed that of the best.
 const BETTER: f32 = 3.0;
-/// Share of the scatter that a fault of the camera may leave to be told: it acts on a velocity that
-/// is itself reckoned with errors.
+/// Share of the scatter that a camera fault may leave: it acts on a velocity that is itself
+/// reckoned with errors.
 const TOLD: f32 = 0.35;
-/// Share of the motion's square by which a camera that sees it may differ: an error of scale of 40 %.
+/// Share of the squared motion by which a healthy camera may differ: a scale error of 40 %.
 const AGREES: f32 = 0.2;
-/// What a fault makes of the picture, along the body's axes: dead, reversed, and swapped both ways.
+/// Camera faults along the body axes: dead, reversed, and swapped with either sign.
 const FAULTS: [[[f32; 2]; 2]; 4] =
     [[[0.0; 2]; 2], [[-1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]], [[0.0, -1.0], [-1.0, 0.0]]];
 
-/// Means over a stretch of time, world, north and east.
+/// Means over one point, world, north and east.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Point {
-    /// Since the reckoner began, s.
+    /// Age of the reckoner, s.
     time: f32,
-    /// The camera's velocity less the reckoned one, m/s.
+    /// Camera velocity minus reckoned velocity, m/s.
     apart: [f32; 2],
-    /// What the picture should show: the reckoned velocity, and what turning adds, m/s.
+    /// Expected image velocity: the reckoned velocity plus the contribution of the rotation, m/s.
     shown: [f32; 2],
-    /// To the floor, m.
+    /// Distance to the floor, m.
     distance: f32,
 }
 
-/// The course since a reckoner began.
+/// The course since the start of a reckoner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Course {
     points: [Point; POINTS],
     count: usize,
-    /// The point that is being filled: sums over so many readings.
+    /// Sums for the point being filled, over `readings` readings.
     filling: Point,
     readings: f32,
     until: f32,
 }
 
-/// What a course is compared with.
+/// Limits of the fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FitLimits {
-    /// Largest shift that is looked for, rad/s.
+    /// Largest shift, rad/s.
     pub largest: f32,
-    /// Deviation of the acceleration that the reckoner gets wrong, m/s².
+    /// Standard deviation of the reckoner's acceleration error, m/s².
     pub accel_sigma: f32,
-    /// Largest acceleration of a tilt that was wrong when it began, m/s².
+    /// Largest acceleration from a tilt error at the start, m/s².
     pub tilt: f32,
-    /// What a point is wrong by beside that, (m/s)².
+    /// Noise variance of a point, (m/s)².
     pub noise: f32,
-    /// The body's heading, rad.
+    /// Heading of the body, rad.
     pub heading: f32,
 }
 
-/// What explains a course.
+/// Explanation of a course.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Explanation {
-    /// Nothing yet.
+    /// None yet.
     Unclear,
-    /// The camera.
+    /// A camera fault.
     Camera,
-    /// A tilt that was wrong when the reckoner began.
+    /// A tilt error at the start of the reckoner.
     Tilt,
-    /// A shift of the gyro's zero, or a burst that has turned the reckoned attitude and is over: a shift
-    /// of zero.
+    /// A shift of the gyro's zero; or a past burst, which has rotated the reckoned attitude, with a
+    /// rate of zero.
     Gyro(Shift),
-    /// A shift of the gyro's zero, or something else that looks much the same yet.
+    /// A shift of the gyro's zero, or another cause that cannot be distinguished yet.
     PerhapsGyro,
 }
 
 /// A shift of the gyro's zero, world, about north and east.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shift {
-    /// What to add to the gyro's bias, rad/s.
+    /// Addition to the gyro bias, rad/s.
     pub rate: [f32; 2],
-    /// How far to turn the reckoned attitude, rad, at the time of the last point, s.
+    /// Rotation of the reckoned attitude, rad, valid at the time `at` of the last point, s.
     pub turn: [f32; 2],
     pub at: f32,
 }
 
 impl Course {
-    /// Takes a reading at the age of the reckoner, s.
+    /// Adds a reading at the age of the reckoner, s.
     pub(crate) fn add(&mut self, age: f32, apart: [f32; 2], shown: [f32; 2], distance: f32) {
         if self.readings == 0.0 {
             self.until = age + STRETCH;
@@ -146,15 +147,15 @@ impl Course {
         }
     }
 
-    /// Does the camera see the motion that is reckoned? `None` where that has changed by less than
-    /// `motion`, m/s, in the mean. A velocity that was wrong from the beginning says nothing here.
+    /// Whether the camera follows the reckoned motion. `None` while the expected image velocity has
+    /// scattered by less than `motion`, m/s. A constant error of the velocity has no effect here.
     pub(crate) fn agrees(&self, motion: f32) -> Option<bool> {
         let points = self.points.get(..self.count).filter(|points| points.len() >= SHORTEST)?;
         let moved = scatter(points, |point| point.shown);
         (moved > motion * motion).then(|| scatter(points, |point| point.apart) < AGREES * moved)
     }
 
-    /// What explains it.
+    /// The explanation of the course.
     pub(crate) fn explanation(&self, limits: &FitLimits) -> Explanation {
         let points = self.points.get(..self.count).unwrap_or(&[]);
         let tilt = TILT_SIGMAS * limits.accel_sigma;
@@ -164,7 +165,7 @@ impl Course {
         let fault = best_fault(points, tilt, limits.heading).min(offset.unwrap_or(f32::MAX));
         let (camera, gyro) = (limits.noise + fault, limits.noise + shift.left);
         let straight = limits.noise + leaves(points, |point| point.apart, limits.tilt);
-        // The simplest explanation first: what a line leaves, the others have to leave much less of.
+        // Simplest explanation first: the others must leave much less than a line does.
         let explains = |left: f32| left < (1.0 + NOISES) * limits.noise + LEFT * size;
         if explains(straight) && camera > BETTER * straight {
             return Explanation::Tilt;
@@ -189,8 +190,8 @@ impl Course {
     }
 }
 
-/// What was fitted. Of a shift: turned by a quarter, rad/s (of a burst rad), since when, s, the acceleration of the tilt
-/// that was wrong before, m/s², and what is left, (m/s)².
+/// Result of a fit: slope, rotated by a quarter turn, rad/s (of a burst rad); start, s;
+/// acceleration of the tilt error before it, m/s²; residual, (m/s)².
 struct Fitted {
     slope: [f32; 2],
     before: [f32; 2],
@@ -199,17 +200,17 @@ struct Fitted {
 }
 
 impl Fitted {
-    /// The turn about north and east that makes its acceleration, rad, after so many seconds.
+    /// Rotation about north and east that corresponds to the acceleration, rad, after `seconds`.
     fn turn(&self, seconds: f32) -> [f32; 2] {
         let [north, east]: [f32; 2] =
             core::array::from_fn(|axis| self.before[axis] + GRAVITY * self.slope[axis] * seconds);
-        // A quarter turn back: what grows eastwards comes from a turn about north.
+        // A quarter turn back: an eastward acceleration comes from a rotation about north.
         [east / GRAVITY, -north / GRAVITY]
     }
 }
 
-/// The shift that leaves the least of all that may have begun at one of the points. `tilt`: largest
-/// acceleration of a tilt that was wrong before, m/s².
+/// The best fit of a shift over all start points. `tilt`: largest acceleration of a tilt error
+/// before it, m/s².
 fn best_shift(points: &[Point], tilt: f32) -> Option<Fitted> {
     best_since(points, SHORTEST, |onset| {
         let since = points.get(onset)?.time;
@@ -217,12 +218,12 @@ fn best_shift(points: &[Point], tilt: f32) -> Option<Fitted> {
             let age = point.time - since;
             if age > 0.0 || onset == 0 { 0.5 * GRAVITY * age * age - point.distance } else { 0.0 }
         };
-        // What began before the first point has made any tilt.
+        // A shift that began before the first point may have caused any tilt.
         Some(fitted(points, since, if onset == 0 { f32::MAX } else { tilt }, basis))
     })
 }
 
-/// The same of a burst of the gyro, after which the tilt is another one.
+/// The best fit of a gyro burst, after which the tilt differs.
 fn best_burst(points: &[Point], tilt: f32) -> Option<Fitted> {
     best_since(points, SHORTEST_BURST, |onset| {
         let since = points.get(onset)?.time;
@@ -234,7 +235,7 @@ fn best_burst(points: &[Point], tilt: f32) -> Option<Fitted> {
     })
 }
 
-/// What leaves the least, of all that may have begun at one of the points.
+/// The fit with the smallest residual over all start points.
 fn best_since(points: &[Point], shortest: usize, fit: impl Fn(usize) -> Option<Fitted>) -> Option<Fitted> {
     if points.len() < ENOUGH {
         return None;
@@ -249,9 +250,9 @@ fn best_since(points: &[Point], shortest: usize, fit: impl Fn(usize) -> Option<F
     best
 }
 
-/// A multiple of this basis, and a line.
+/// A fit of a multiple of `basis` and a line.
 fn fitted(points: &[Point], since: f32, tilt: f32, basis: impl Fn(&Point) -> f32) -> Fitted {
-    // With a line and without.
+    // With the line and without it.
     let [along, _] = fit(points, |point| [basis(point), 0.0], |point| point.time).slope;
     let mut best: Option<Fitted> = None;
     for along in [along, 0.0] {
@@ -266,7 +267,7 @@ fn fitted(points: &[Point], since: f32, tilt: f32, basis: impl Fn(&Point) -> f32
     best.unwrap_or(Fitted { slope: [0.0; 2], before: [0.0; 2], since, left: f32::MAX })
 }
 
-/// What the best of [`FAULTS`] leaves, of all that may have begun at one of the points.
+/// Smallest residual of all [`FAULTS`] and start points.
 fn best_fault(points: &[Point], tilt: f32, heading: f32) -> f32 {
     let mut best = f32::MAX;
     for onset in 0..=points.len().saturating_sub(SHORTEST_FAULT) {
@@ -279,7 +280,7 @@ fn best_fault(points: &[Point], tilt: f32, heading: f32) -> f32 {
                     return point.apart;
                 }
                 let drift = drift.at(point.time);
-                // The camera sees what is true, which is what was reckoned and the drift of that.
+                // The true velocity is the reckoned one plus its drift.
                 let seen = [point.shown[0] + drift[0], point.shown[1] + drift[1]];
                 let [north, east] = made_of(seen, fault, heading);
                 [point.apart[0] - (north - seen[0]), point.apart[1] - (east - seen[1])]
@@ -290,7 +291,7 @@ fn best_fault(points: &[Point], tilt: f32, heading: f32) -> f32 {
     best
 }
 
-/// What a fault makes of a velocity, north and east.
+/// Velocity that a faulty camera shows for a true one, north and east.
 fn made_of([north, east]: [f32; 2], [ahead, aside]: &[[f32; 2]; 2], heading: f32) -> [f32; 2] {
     let (sin, cos) = math::sin_cos(heading);
     let [x, y] = [north * cos + east * sin, east * cos - north * sin];
@@ -298,7 +299,7 @@ fn made_of([north, east]: [f32; 2], [ahead, aside]: &[[f32; 2]; 2], heading: f32
     [x * cos - y * sin, x * sin + y * cos]
 }
 
-/// How a reckoner has drifted while the camera was sound: a line.
+/// Linear drift of a reckoner while the camera was healthy.
 struct Drift {
     middle: f32,
     value: [f32; 2],
@@ -306,9 +307,9 @@ struct Drift {
 }
 
 impl Drift {
-    /// Of these points. `tilt`: its largest slope, m/s².
+    /// From these points. `tilt`: largest slope, m/s².
     fn before(points: &[Point], tilt: f32) -> Self {
-        // With fewer it is a scatter, not a line.
+        // Fewer points do not determine a slope.
         let slope = if points.len() < SHORTEST_FAULT { 0.0 } else { tilt };
         Self {
             middle: mean(points, |point| [point.time, 0.0])[0],
@@ -322,9 +323,9 @@ impl Drift {
     }
 }
 
-/// What an offset of the picture's motion leaves.
+/// Residual of an offset of the image motion.
 fn offset(points: &[Point], tilt: f32) -> f32 {
-    // With a line and without.
+    // With the line and without it.
     let [along, _] = fit(points, |point| [point.distance, 0.0], |point| point.time).slope;
     let left = |along: f32| {
         let slope = fit(points, |point| point.apart, |point| point.distance - along * point.time).slope;
@@ -333,7 +334,7 @@ fn offset(points: &[Point], tilt: f32) -> f32 {
     math::smaller(left(along), left(0.0))
 }
 
-/// Mean square of what is left of values without their mean and a line, whose slope is limited, m/s².
+/// Mean square of values after removal of their mean and of a line with limited slope, m/s².
 fn leaves(points: &[Point], value: impl Fn(&Point) -> [f32; 2], tilt: f32) -> f32 {
     let line = fit(points, &value, |point| point.time);
     let slope = limited(line.slope, tilt);
@@ -343,13 +344,13 @@ fn leaves(points: &[Point], value: impl Fn(&Point) -> [f32; 2], tilt: f32) -> f3
     })
 }
 
-/// The same direction, and no longer than this.
+/// A vector shortened to at most this length.
 fn limited([x, y]: [f32; 2], most: f32) -> [f32; 2] {
     let share = most / math::larger(math::sqrt(x * x + y * y), most);
     if share < 1.0 { [share * x, share * y] } else { [x, y] }
 }
 
-/// A line through values over a basis: how much they grow with it.
+/// Regression of values on a basis.
 struct Line {
     slope: [f32; 2],
 }
@@ -372,7 +373,7 @@ fn mean(points: &[Point], value: impl Fn(&Point) -> [f32; 2]) -> [f32; 2] {
     sum.map(|sum| sum / points.len().max(1) as f32)
 }
 
-/// Mean square about the mean, of both axes together.
+/// Mean square about the mean, sum of both axes.
 fn scatter(points: &[Point], value: impl Fn(&Point) -> [f32; 2]) -> f32 {
     let [north, east] = mean(points, &value);
     let [x, y] = mean(points, |point| {
@@ -391,7 +392,8 @@ mod tests {
     const DISTANCE: f32 = 0.5;
     const LIMITS: FitLimits = FitLimits { largest: 1.2, accel_sigma: 0.1, tilt: 0.3, noise: 1e-3, heading: 0.0 };
 
-    /// A course of so many seconds: velocities of camera and reckoner as functions of time.
+    /// The explanation of a course of `seconds`; velocities of camera and reckoner are functions of
+    /// time.
     fn course(
         seconds: f32,
         camera: impl Fn(f32) -> [f32; 2],
@@ -409,11 +411,11 @@ mod tests {
 
     const STILL: fn(f32) -> [f32; 2] = |_| [0.0; 2];
     const HIGH: fn(f32) -> f32 = |_| DISTANCE;
-    /// To half a metre within a second.
+    /// Climb to half a metre within a second.
     const CLIMBS: fn(f32) -> f32 = |time| (0.5 * time).min(DISTANCE);
 
-    /// The camera of a vehicle that stays where it is, whose roll rate is too high by this since then,
-    /// as it is compensated with that rate.
+    /// The camera of a hovering vehicle whose roll rate is too high by `bias` since `since`,
+    /// compensated with that rate.
     fn shifted(bias: f32, since: f32, distance: fn(f32) -> f32) -> impl Fn(f32) -> [f32; 2] {
         move |time| {
             let age = time - since;

@@ -1,4 +1,4 @@
-//! What hypotheses see in one step. Everything is computed once, here, for all of them.
+//! The input of the hypotheses in one step, computed once for all of them.
 
 use crate::altimeter::{Altimeter, AltitudeReading};
 use crate::config::MonitorConfig;
@@ -11,127 +11,127 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{GRAVITY, Instant, Stamped, Vec3, frame, math};
 
-/// Position of each sensor in the counters of an estimator's status.
+/// Index of flow in the counters of the estimator's status.
 pub(crate) const FLOW: usize = 1;
-/// A mean square change of the accelerometer from sample to sample beyond this, (m/s²)², says that
-/// nothing can be reckoned with it: ten metres per second squared from one to the next.
+/// Mean square sample-to-sample change of the accelerometer, (m/s²)², above which dead reckoning is
+/// not used: 10 m/s² from one sample to the next.
 const SHAKEN: f32 = 100.0;
-/// Standard deviation of a climb rate by barometer and accelerometer, m/s.
+/// Standard deviation of the climb rate by barometer and accelerometer, m/s.
 const CLIMB_SIGMA: f32 = 0.7;
-/// Tilt that an estimator in the air may find to be wrong, rad: 20°, after a flip. On the ground
-/// gravity shows it, to so many deviations.
+/// Largest tilt error that the estimator may discover, rad: in flight 20°, as after a flip; on the
+/// ground, where gravity shows the tilt, `WRONG_TILTS` standard deviations.
 const WRONG_TILT: f32 = 0.35;
 const WRONG_TILTS: f32 = 3.0;
-/// Shortest distance to the floor, m, over which a velocity is a rate of the picture.
+/// Shortest distance to the floor at which a velocity is converted to an image rate, m.
 const LEAST_DISTANCE: f32 = 0.02;
 
-/// Share of the full scale from which on a force may have been larger.
+/// Share of the full scale above which a force may have been clipped.
 const CLIPS: f32 = 0.9;
-/// Number of intervals without a reading after which readings are missing.
+/// Number of reading intervals after which readings count as missing.
 const MISSING: f32 = 3.0;
 
-/// A reading of the camera, as the estimator has compared it.
+/// A camera reading that the estimator has compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowReading {
-    /// Counts as they came, rad.
+    /// Counts of the sensor, rad.
     pub counts: [f32; 2],
-    /// Over so long, s.
+    /// Interval of the reading, s.
     pub interval: f32,
-    /// To the floor, along the camera's axis, m.
+    /// Distance to the floor along the camera's axis, m.
     pub distance: f32,
-    /// The rate of the picture that the body's turning makes, rad/s.
+    /// Image rate due to the body's rotation, rad/s.
     pub turning: [f32; 2],
-    /// The rate of the picture that neither the turning nor the estimated velocity makes, rad/s.
+    /// Image rate that neither rotation nor estimated velocity explains, rad/s.
     pub rate: [f32; 2],
-    /// The camera's velocity less each reckoner's, world, north and east, m/s: of this reading, and
-    /// smoothed.
+    /// Camera velocity minus that of each reckoner, world, north and east, m/s.
     pub apart: [[f32; 2]; 2],
-    /// See [`apart`](Self::apart).
+    /// The same, smoothed.
     pub smooth: [[f32; 2]; 2],
-    /// Ages of the reckoners that it was compared with, s: one may have begun anew since.
+    /// Ages of the reckoners used, s; one may have restarted since.
     pub ages: [f32; 2],
-    /// Square of what readings may be wrong by, as far as it is still in the smoothed difference,
+    /// Variance of single readings as far as it is still contained in the smoothed difference,
     /// (m/s)².
     pub uncertain: f32,
-    /// Square of the smoothed difference over that of its limit, the larger of both reckoners'.
+    /// Squared smoothed difference divided by its squared limit; the larger value of the two
+    /// reckoners.
     pub ratio: f32,
-    /// May reckoners be compared with at all? Not where the accelerometer is shaken too hard, the
-    /// distance is not measured, or readings before this one are missing, as in a turn that the camera
-    /// does not follow.
+    /// Whether the comparison with reckoners is valid. Not while the accelerometer vibrates too
+    /// much, the distance is not measured, or preceding readings are missing, as in a turn that the
+    /// camera cannot track.
     pub comparable: bool,
 }
 
-/// What hypotheses see in one step.
+/// The input of the hypotheses in one step.
 pub struct Evidence<'a> {
-    /// The instant of the step.
+    /// Time of the step.
     pub now: Instant,
-    /// The inertial samples since the step before, oldest first.
+    /// Inertial samples since the last step, oldest first.
     pub samples: &'a [Stamped<ImuData>],
-    /// The estimate that followed from them.
+    /// The estimate after these samples.
     pub estimate: &'a StateEstimate,
-    /// How the estimator compared its sensors.
+    /// The estimator's residuals and counters.
     pub status: &'a EstimatorStatus,
-    /// The vehicle stands on the ground, as its mode machine knows.
+    /// The vehicle stands on the ground, as reported by the mode machine.
     pub stands: bool,
-    /// Its propellers carry it.
+    /// The propellers carry the vehicle.
     pub flies: bool,
-    /// Reckoned from estimates that no camera has touched since.
+    /// Dead reckoning, independent of the camera since its start.
     pub reckoners: &'a Reckoners,
-    /// How the camera's velocity has grown away from them.
+    /// Difference between camera and each reckoner over time.
     pub(crate) courses: &'a [Course; 2],
-    /// Mean square change from sample to sample of the accelerometer, (m/s²)², and the gyro, (rad/s)².
+    /// Mean square sample-to-sample change of the accelerometer, (m/s²)², and of the gyro,
+    /// (rad/s)².
     pub shaken: [f32; 2],
-    /// A reading of the camera that came in this step.
+    /// The camera reading of this step.
     pub flow: Option<FlowReading>,
     /// Height and climb rate without the range.
     pub altimeter: &'a Altimeter,
-    /// A range that the estimator has compared in this step.
+    /// The range of this step, if the estimator has compared it.
     pub range: Option<RangeReading>,
-    /// How often the one that came in this step, compared or not, has repeated itself.
+    /// Repetitions of the range of this step, compared or not.
     pub range_repeat: Option<RangeRepeat>,
-    /// The range is not left out.
+    /// The range has no finding.
     pub trusts_range: bool,
-    /// The vehicle has a range finder and a barometer, and feels its acceleration.
+    /// The vehicle has a range finder and a barometer, and its accelerometer works.
     pub has_range: bool,
-    /// An altitude that came in this step.
+    /// The altitude of this step.
     pub altitude: Option<AltitudeReading>,
-    /// A block of inertial samples that this step has completed, along the vertical, in the air.
+    /// The block of inertial samples completed in this step, along the vertical; in flight only.
     pub block: Option<Block>,
-    /// How far the estimate was moved upwards lately, m, and how often its height was.
+    /// Recent upward displacement of the estimate by resets to the range, m.
     pub moved: f32,
-    /// See [`moved`](Self::moved).
+    /// Number of recent resets of height or surface.
     pub moves: u32,
-    /// Height of the range finder on a vehicle that stands, m.
+    /// Height of the range finder while the vehicle stands, m.
     pub ground_clearance: f32,
-    /// The camera is not left out.
+    /// The camera has no finding.
     pub trusts_flow: bool,
-    /// The inertial samples are believed: the estimator has bridged none of them lately.
+    /// The estimator has not bridged an inertial sample recently.
     pub trusts_samples: bool,
-    /// The gyro's zero was found to have shifted in the air some seconds ago.
+    /// A shift of the gyro's zero was found in flight within the last seconds.
     pub shifted_lately: bool,
-    /// Neither the start in the air nor a correction is so recent that the estimate is still finding
-    /// itself.
+    /// The estimate is not converging after a start in the air or a correction.
     pub settled: bool,
 }
 
 impl Evidence<'_> {
-    /// How the camera's velocity has grown away from a reckoner.
+    /// Difference between camera and a reckoner over time.
     pub(crate) fn course(&self, index: usize) -> &Course {
         let [first, second] = self.courses;
         if index == 0 { first } else { second }
     }
 
-    /// What the course against a reckoner is judged by, at this distance from the floor, m.
+    /// Limits for the fits to the course of a reckoner, at this distance from the floor, m.
     pub(crate) fn limits(&self, config: &MonitorConfig, index: usize, distance: f32) -> FitLimits {
         let picture = config.flow_rate_sigma_rad_s * distance;
         let Reckoner { sigmas: Sigmas { acceleration: accel_sigma, .. }, stood, walk, .. } = *self.reckoners.get(index);
         FitLimits {
             largest: config.gyro_shift_rad_s,
             accel_sigma,
-            // In the air the estimator may find its tilt to be wrong by any angle that it flies with.
+            // In flight the estimator may discover any tilt error that it can fly with.
             tilt: if stood { WRONG_TILTS * accel_sigma } else { GRAVITY * WRONG_TILT },
-            // A third of the deviation with which it began: that was one for all of the course.
-            // A line leaves a fifteenth of the variance that a random walk ends with.
+            // A ninth of the initial variance: that error was common to the whole course. A fitted
+            // line leaves a fifteenth of the final variance of a random walk.
             noise: config.velocity_sigma_m_s * config.velocity_sigma_m_s * (1.0 / 9.0)
                 + picture * picture
                 + walk * (1.0 / 15.0),
@@ -139,7 +139,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// What gives the estimate another climb rate, m/s, and moves it upwards, m.
+    /// Correction that sets the climb rate, m/s, and moves the estimate upwards by `higher`, m.
     pub(crate) fn climbs(&self, higher: f32, climb: f32) -> EstimateCorrection {
         let estimate = self.estimate;
         EstimateCorrection {
@@ -151,13 +151,14 @@ impl Evidence<'_> {
         }
     }
 
-    /// What takes height and climb rate back to the altimeter's, if ranges have misled the estimate.
+    /// Correction back to the height and climb rate of the altimeter; `None` if ranges have not
+    /// moved the estimate.
     pub(crate) fn back_to_altimeter(&self) -> Option<EstimateCorrection> {
         let altimeter = self.altimeter;
         if self.moved == 0.0 {
             return None;
         }
-        // Right after the take-off the altimeter knows how far it came.
+        // Shortly after the take-off the altimeter knows the height above the ground.
         let higher = if altimeter.knows_take_off() {
             altimeter.height + self.ground_clearance - self.estimate.height
         } else {
@@ -166,25 +167,25 @@ impl Evidence<'_> {
         Some(self.climbs(higher, altimeter.climb))
     }
 
-    /// What takes the estimate back to the older reckoner.
+    /// Correction back to the older reckoner.
     pub(crate) fn back_to_reckoned(&self) -> EstimateCorrection {
         self.back_to(self.reckoners.older())
     }
 
-    /// The correction back to the reckoner that began last before a camera failed `ago` seconds ago.
-    /// `None` where nothing can be compared with reckoners.
+    /// Correction back to the last reckoner started before a camera fault `ago` seconds ago. `None`
+    /// while the reckoners are not comparable.
     pub(crate) fn back_to_before(&self, ago: f32) -> Option<EstimateCorrection> {
         let comparable = self.settled && self.flow.is_some_and(|flow| flow.comparable);
         comparable.then(|| self.back_to(self.last_before(ago)))
     }
 
-    /// Index of the reckoner that began last before `ago` seconds ago.
+    /// Index of the last reckoner started before `ago` seconds ago.
     pub(crate) fn last_before(&self, ago: f32) -> usize {
         let older = self.reckoners.older();
         if self.reckoners.get(1 - older).age > ago { 1 - older } else { older }
     }
 
-    /// What takes the estimate back to a reckoner.
+    /// Correction that sets attitude, velocity and biases to those of a reckoner.
     pub(crate) fn back_to(&self, index: usize) -> EstimateCorrection {
         let (reckoner, estimate) = (self.reckoners.get(index), self.estimate);
         EstimateCorrection {
@@ -200,29 +201,29 @@ impl Evidence<'_> {
     }
 }
 
-/// What is remembered to compute it.
+/// The state from which the evidence is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recollection {
     pub(crate) reckoners: Reckoners,
     pub(crate) courses: [Course; 2],
     shaken: [Vibration; 2],
-    /// Readings of the camera that the estimator has compared.
+    /// The estimator's counter of compared camera readings.
     tested: u32,
     smooth: [[f32; 2]; 2],
     uncertain: f32,
-    /// When the estimator compared a reading last.
+    /// Time at which the estimator last compared a reading.
     compared: Option<Instant>,
 }
 
 impl Recollection {
-    /// Mean square change from sample to sample.
+    /// Mean square sample-to-sample changes.
     pub(crate) fn shaken(&self) -> [f32; 2] {
         let [force, rate] = &self.shaken;
         [force.mean_square(), rate.mean_square()]
     }
 
-    /// Takes the inertial samples of a step, and the estimate that followed.
+    /// Processes the inertial samples of a step and the estimate after them.
     pub(crate) fn inertial(
         &mut self,
         config: &MonitorConfig,
@@ -254,8 +255,8 @@ impl Recollection {
         }
     }
 
-    /// The reckoner with this index has begun anew: what was smoothed against it is against the
-    /// estimate now.
+    /// Reckoner `index` has restarted from the estimate: express its smoothed difference by that of
+    /// the other one.
     fn began_anew(&mut self, index: usize) {
         let other = 1 - index.min(1);
         let off = self.reckoners.apart(other);
@@ -266,7 +267,7 @@ impl Recollection {
         }
     }
 
-    /// Both begin anew with this estimate, which has just been put right.
+    /// Restarts both reckoners from an estimate that has just been corrected.
     pub(crate) fn begin(&mut self, estimate: &StateEstimate, sigmas: Sigmas) {
         self.reckoners.begin(estimate, sigmas, false);
         self.forget();
@@ -276,7 +277,7 @@ impl Recollection {
         (self.courses, self.smooth, self.uncertain) = Default::default();
     }
 
-    /// Takes the newest reading of the camera, if the estimator has compared one in this step.
+    /// Processes the newest camera reading, if the estimator has compared one in this step.
     pub(crate) fn flow(
         &mut self,
         now: Instant,
@@ -300,17 +301,17 @@ impl Recollection {
         let turning = [raw.y, -raw.x];
         let [x, y] = status.flow_innovation;
         let square = |value: f32| value * value;
-        // What turning adds to the velocity that the picture shows.
+        // Contribution of the rotation to the velocity in the image.
         let turns = Vec3::new(turning[0] * distance, turning[1] * distance, 0.0);
         let turns = estimate.attitude.transform_vector(&turns);
 
-        // Single readings: frames that they hold too many or too few of, and pictures that are older.
+        // Error of single readings: a wrong number of frames, and a later frame.
         let rates = [flow.delta_x / interval, flow.delta_y / interval];
         let picture = square(rates[0]) + square(rates[1]) + square(turning[0]) + square(turning[1]);
         let change = self.reckoners.turning_change();
         let frames = square(config.flow_frame_share * distance) * picture;
         let late = square(config.flow_late_s * distance) * (square(change.x) + square(change.y));
-        // It leaves the difference as it came in: of squares, twice as fast.
+        // The contribution decays with the smoothing; its square decays twice as fast.
         let fades = config.flow_smooth_s / (config.flow_smooth_s + 2.0 * interval);
         self.uncertain = math::larger(frames + late, self.uncertain * fades);
 
@@ -321,7 +322,8 @@ impl Recollection {
             apart.iter_mut().zip(&mut self.smooth).zip(&mut self.courses).enumerate()
         {
             let (off, reckoner) = (self.reckoners.apart(index), self.reckoners.get(index));
-            // The camera is freed of the turn by the reckoner's bias, not by what it made of the estimate's.
+            // Compensate the rotation with the reckoner's gyro bias: the estimate's may already be
+            // corrupted by the camera.
             let bias = (estimate.gyro_bias - reckoner.gyro_bias) * distance;
             let body = Vec3::new(x - bias.y, y + bias.x, 0.0);
             let world = estimate.attitude.transform_vector(&body);

@@ -1,10 +1,10 @@
-//! What a hypothesis is: one thing that may be wrong with one sensor, and what it says about a step.
+//! The interface of a hypothesis: one possible fault of one sensor, tested in every step.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
 use stampfly_types::messages::{EstimateCorrection, Finding};
 
-/// A sensor that is judged.
+/// A monitored sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     /// Gyro.
@@ -15,29 +15,29 @@ pub enum Sensor {
     Flow,
 }
 
-/// What a hypothesis says about a step.
+/// Result of a hypothesis for one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Opinion {
-    /// There is nothing to judge by.
+    /// No information.
     Unknown,
-    /// What is seen fits a sound sensor.
+    /// The sensor's data are consistent with a healthy sensor.
     Fits,
-    /// It fits badly, which is not enough to say that it is wrong.
+    /// The data are inconsistent, but not enough to report a fault.
     Misfits,
-    /// The hypothesis holds, with what puts the estimate right if the sensor has misled it.
+    /// The fault is present. The correction removes its effect from the estimate, if it had one.
     Holds(Option<EstimateCorrection>),
 }
 
-/// One thing that may be wrong with one sensor.
+/// One possible fault of one sensor.
 ///
-/// It remembers what it needs, and sees each step once, in order. The monitor
-/// acts on the step in which it begins to hold; on a [`Finding::Shifted`] in each.
+/// A hypothesis keeps its own state and receives each step once, in order. The monitor acts on the
+/// step in which the fault begins to hold; for [`Finding::Shifted`] on every one.
 pub trait Hypothesis {
     /// The sensor.
     const SENSOR: Sensor;
-    /// What is wrong with it, if the hypothesis holds.
+    /// The finding reported when the hypothesis holds.
     const FINDING: Finding;
 
-    /// Takes a step.
+    /// Processes one step.
     fn step(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Opinion;
 }

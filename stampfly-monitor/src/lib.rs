@@ -1,26 +1,30 @@
-//! Judges the sensors of a small vehicle, beside its state estimator.
+//! Fault detection for the sensors of a small vehicle, next to its state estimator.
 //!
-//! A Kalman filter rejects a measurement that is far from what it expects. It does not see a sensor
-//! that goes wrong slowly, stays at a value or is right while another one is wrong: such a sensor takes
-//! the estimate with it. A [`Monitor`] looks at the samples, at how the estimator compared them, and at
-//! what it reckons by itself, and says which sensor measures. Where one has misled the estimate, it
-//! says by how much.
+//! A Kalman filter rejects measurements that are far from its prediction. It does not detect a
+//! sensor that drifts slowly, freezes, or is correct while another one is wrong: such a sensor
+//! pulls the estimate along. A [`Monitor`] compares the samples, the residuals of the estimator and
+//! its own dead reckoning, and reports which sensors are faulty. If a faulty sensor has moved the
+//! estimate, it also returns a correction.
 //!
-//! | module | what |
+//! | module | content |
 //! |---|---|
-//! | [`monitor`] | the list of hypotheses, and what follows from them |
-//! | [`hypothesis`] | what a hypothesis is, and what it says |
-//! | [`hypotheses`] | the hypotheses, one a file |
-//! | [`evidence`] | what they see in a step, computed once |
-//! | [`reckoner`] | attitude and velocity by gyro and accelerometer alone |
-//! | [`course`] | what explains the difference between camera and reckoner |
+//! | [`monitor`] | the list of hypotheses, and the evaluation of a step |
+//! | [`hypothesis`] | the interface of a hypothesis |
+//! | [`hypotheses`] | the hypotheses, one per file |
+//! | [`evidence`] | the input of the hypotheses in a step, computed once |
+//! | [`reckoner`] | dead reckoning by gyro and accelerometer |
+//! | [`course`] | fits to the difference between camera and dead reckoning |
 //! | [`altimeter`] | height and climb rate by accelerometer and barometer |
-//! | [`vertical`] | ranges, and how the estimate moves with them |
-//! | [`config`] | every threshold, with its unit and where it comes from |
+//! | [`vertical`] | ranges, and how the estimate follows them |
+//! | [`config`] | the thresholds, with unit and origin |
 //!
-//! Use it for a vehicle with an inertial sensor and a camera for optical flow, or a range finder with a
-//! barometer. Not for a receiver of satellites, which judges itself by its accuracy, and not for a
-//! sensor that is silent: whoever reads it sees that.
+//! Use it for a vehicle with an inertial sensor and a camera for optical flow, or a range finder
+//! with a barometer. Not for a satellite receiver, which states its own accuracy, and not for a
+//! silent sensor, which its reader detects by the time of the last sample.
+//!
+//! # Timing
+//! Call [`Monitor::step`] once per estimator step, after the estimate; time is an argument. The
+//! crate has no clock and allocates nothing.
 //!
 //! ```
 //! use stampfly_monitor::{Monitor, MonitorConfig, MonitorInput};
@@ -54,5 +58,5 @@ mod vibration;
 pub use config::MonitorConfig;
 pub use hypothesis::{Hypothesis, Opinion, Sensor};
 pub use monitor::{HYPOTHESES, Monitor, MonitorInput};
-/// The types of this crate's interface.
+/// Re-exported because its types appear in this crate's interface.
 pub use stampfly_types as types;

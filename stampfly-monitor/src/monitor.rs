@@ -1,4 +1,4 @@
-//! The monitor: evidence, every hypothesis in turn, and what follows for each sensor.
+//! [`Monitor`]: computes the evidence, tests every hypothesis, and derives findings and a correction.
 
 use crate::config::MonitorConfig;
 use crate::evidence::{Evidence, Recollection};
@@ -12,54 +12,54 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{GRAVITY, Instant, Stamped, math};
 
-/// After a start in the air the estimator first has to find tilt and biases, s: a gyro bias of 3°/s
-/// takes as long.
+/// Time for which the monitor reports nothing after a start in the air, s, while the estimator
+/// converges: a gyro bias of 3°/s takes as long.
 const UNKNOWN: f32 = 20.0;
-/// After a correction it settles within this time, s.
+/// Time for which it reports nothing after a correction, s.
 const SETTLES: f32 = 0.5;
-/// For so long after a garbled sample a difference between samples may be that of its bridge, s.
+/// Time after a bridged sample in which a sample-to-sample change may come from the bridge, s.
 const BRIDGED: f32 = 0.01;
 
-/// What the monitor looks at in one step. Everything is borrowed.
+/// Input of one step, borrowed.
 #[derive(Clone, Copy, Debug)]
 pub struct MonitorInput<'a> {
-    /// The inertial samples since the step before, oldest first.
+    /// Inertial samples since the last step, oldest first.
     pub imu: &'a [Stamped<ImuData>],
-    /// The readings of the camera since then.
+    /// Camera readings since the last step.
     pub flow: &'a [Stamped<FlowData>],
-    /// The ranges.
+    /// Ranges since the last step.
     pub tof: &'a [Stamped<TofData>],
-    /// The air pressures.
+    /// Barometer samples since the last step.
     pub baro: &'a [Stamped<BaroData>],
-    /// The estimate that followed from all of them.
+    /// The estimate after all of them.
     pub estimate: &'a StateEstimate,
-    /// How the estimator compared its sensors.
+    /// The estimator's residuals and counters.
     pub status: &'a EstimatorStatus,
-    /// The vehicle stands on the ground, as its mode machine knows.
+    /// The vehicle stands on the ground, as reported by the mode machine.
     pub stands: bool,
-    /// Its propellers carry it.
+    /// The propellers carry the vehicle.
     pub flies: bool,
-    /// The accelerometer measures.
+    /// The accelerometer works.
     pub felt: bool,
-    /// A change of this number says that the estimate has begun anew.
+    /// Counter of restarts of the estimate.
     pub restarts: u32,
 }
 
-/// Declares the hypotheses: a line each, in the order in which they are asked. What is removed here is
-/// not judged.
+/// Declares the hypotheses, one per line, in the order in which they are tested. A removed line
+/// disables its hypothesis.
 macro_rules! hypotheses {
     ($($name:ident: $Hypothesis:ident),* $(,)?) => {
-        /// Every hypothesis.
+        /// All hypotheses.
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         struct Hypotheses { $($name: $Hypothesis),* }
 
-        /// Their names, by the bit that takes one out
-        /// ([`MonitorConfig::without`](crate::MonitorConfig::without)).
+        /// Names of the hypotheses; the index is the bit in
+        /// [`MonitorConfig::without`](crate::MonitorConfig::without) that disables one.
         pub const HYPOTHESES: &[&str] = &[$(stringify!($name)),*];
 
         impl Hypotheses {
-            /// Asks each of them that is not taken out.
+            /// Tests every enabled hypothesis.
             fn ask(&mut self, answers: &mut Answers<'_>, config: &MonitorConfig, seen: &Evidence<'_>) {
                 let mut without = config.without;
                 $(
@@ -75,7 +75,7 @@ macro_rules! hypotheses {
 }
 
 hypotheses! {
-    // The gyro first: where its zero has moved, the camera is the one that is right.
+    // Gyro first: after a shift of its zero the camera disagrees although it is correct.
     gyro_standing: GyroStanding,
     gyro_jumped: GyroJumped,
     gyro_shifted: GyroShifted,
@@ -90,7 +90,7 @@ hypotheses! {
     range_wrapped: RangeWrapped,
 }
 
-/// Judges sensors beside an estimator.
+/// Sensor monitor. See the [crate] documentation for its use.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Monitor {
@@ -99,12 +99,12 @@ pub struct Monitor {
     vertical: Vertical,
     hypotheses: Hypotheses,
     findings: SensorFindings,
-    /// How long flow and range, left out, have fitted what they should measure, s.
+    /// Time for which flow and range, flagged as faulty, have been consistent again, s.
     fits: [f32; 2],
-    /// How long it has to hold back, s.
+    /// Remaining time without reports, s.
     waits: f32,
     last: Option<Instant>,
-    /// The last sample that was believed.
+    /// The last accepted inertial sample.
     sample: ImuData,
     refused: u32,
     bridged: f32,
@@ -112,19 +112,19 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Of a vehicle about which nothing is known yet.
+    /// A monitor of a vehicle in an unknown state.
     #[must_use]
     pub fn new(config: MonitorConfig) -> Self {
         Self { config, waits: UNKNOWN, vertical: Vertical::airborne(), ..Self::default() }
     }
 
-    /// How each sensor fares.
+    /// The finding of each sensor.
     #[must_use]
     pub fn findings(&self) -> &SensorFindings {
         &self.findings
     }
 
-    /// Takes a step. Gives what the estimate is to be put right by, where a sensor has misled it.
+    /// Processes one step. Returns a correction if a faulty sensor has moved the estimate.
     pub fn step(&mut self, now: Instant, input: &MonitorInput<'_>) -> Option<EstimateCorrection> {
         self.hold_back(now, input);
         if !input.estimate.sensors.contains(SensorMask::IMU) || !is_finite(input.estimate, input.status) {
@@ -136,11 +136,12 @@ impl Monitor {
         let MonitorInput { estimate, status, stands, .. } = *input;
         let samples = if refused { bridged } else { input.imu };
 
-        // The reading of the camera was compared with the estimate before this step's samples.
+        // The estimator compared the reading with its state before this step's samples, so use the
+        // reckoners before them.
         let Self { config, recollection, vertical, .. } = self;
         let mut flow = recollection.flow(now, config, input.flow.last().map(|sample| &sample.data), estimate, status);
         if let Some(flow) = &mut flow {
-            // Nothing is reckoned with what is not felt.
+            // Without an accelerometer there is no dead reckoning.
             flow.comparable &= input.felt;
         }
         recollection.inertial(config, samples, estimate, status, stands);
@@ -152,7 +153,7 @@ impl Monitor {
         let block = vertical.inertial(now, samples, estimate, stands, trusted.range);
         let seen = Evidence {
             now,
-            // What is no measurement is not shown.
+            // Hide samples that the estimator has bridged.
             samples: if refused { &[] } else { input.imu },
             estimate,
             status,
@@ -191,7 +192,8 @@ impl Monitor {
         correction
     }
 
-    /// Counts how long the estimate has to find itself, and begins anew where it does.
+    /// Updates the time without reports, and restarts dead reckoning after a restart of the
+    /// estimate.
     fn hold_back(&mut self, now: Instant, input: &MonitorInput<'_>) {
         let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).seconds());
         self.waits = if input.stands { 0.0 } else { math::larger(self.waits - dt, 0.0) };
@@ -203,7 +205,7 @@ impl Monitor {
             self.vertical.altimeter.restart(-input.estimate.accel_bias.z);
         }
         if input.estimate.sensors.contains(SensorMask::EXTERNAL) {
-            // What sees the vehicle from outside moves the estimate as no camera on board does.
+            // An external measurement moves the estimate in other ways than the on-board sensors.
             self.waits = math::larger(self.waits, SETTLES);
         }
         let refused = core::mem::replace(&mut self.refused, input.status.imu_refused);
@@ -212,7 +214,7 @@ impl Monitor {
         }
     }
 
-    /// What stands for samples that the estimator has just bridged: the last one that was believed.
+    /// Replacement for samples that the estimator has just bridged: the last accepted one.
     fn bridge(&mut self, samples: &[Stamped<ImuData>]) -> Option<Stamped<ImuData>> {
         let newest = samples.last()?;
         if self.bridged == BRIDGED {
@@ -222,23 +224,23 @@ impl Monitor {
         None
     }
 
-    /// Which sensors are not left out.
+    /// The sensors without a finding.
     fn trusted(&self) -> Trusted {
         let SensorFindings { range, flow, .. } = &self.findings;
         Trusted { range: range.finding == Finding::None, flow: flow.finding == Finding::None }
     }
 
-    /// The range has just been found to be wrong.
+    /// Called when a finding about the range has just been made.
     fn begin_without_range(&mut self, now: Instant) {
-        // What it did to the accelerometer's bias since the take-off, and the propellers to the pressure,
-        // cannot be told apart.
+        // After a take-off the effect of the range on the accelerometer bias cannot be separated
+        // from that of the propellers on the pressure, so the barometer is not trusted either.
         if self.vertical.altimeter.knows_take_off() {
             self.findings.baro = Health { finding: Finding::Disagrees, since: now };
         }
         self.vertical.forget();
     }
 
-    /// Uses a sensor again that has fitted for long enough what it should measure.
+    /// Clears the finding of a sensor that has been consistent for long enough.
     fn clear(&mut self, input: &MonitorInput<'_>, fits: [Option<bool>; 2], elapsed: [f32; 2]) {
         for ((time, fits), elapsed) in self.fits.iter_mut().zip(fits).zip(elapsed) {
             match fits {
@@ -251,7 +253,7 @@ impl Monitor {
         if flow >= self.config.flow_agrees_s {
             (self.findings.flow, self.fits[0]) = Default::default();
         }
-        // On the ground the range may say what it wants.
+        // On the ground the range does not affect the estimate.
         if range >= self.config.range_agrees_s || input.stands {
             if self.findings.range.finding != Finding::None && !input.stands {
                 self.vertical.altimeter.restart(-input.estimate.accel_bias.z);
@@ -261,7 +263,7 @@ impl Monitor {
         }
     }
 
-    /// Goes on from the estimate that a correction makes.
+    /// Continues from the corrected estimate.
     fn correct(&mut self, correction: &EstimateCorrection, estimate: &StateEstimate) {
         let corrected = StateEstimate {
             attitude: (stampfly_types::Quat::from_scaled_axis(correction.turn) * estimate.attitude).normalize(),
@@ -287,7 +289,7 @@ impl Monitor {
     }
 }
 
-/// Are these numbers?
+/// Whether all values are finite.
 fn is_finite(estimate: &StateEstimate, status: &EstimatorStatus) -> bool {
     let StateEstimate { attitude, position, velocity, gyro_bias, accel_bias, height, .. } = estimate;
     let vectors = position.norm_squared() + velocity.norm_squared() + gyro_bias.norm_squared();
@@ -295,7 +297,8 @@ fn is_finite(estimate: &StateEstimate, status: &EstimatorStatus) -> bool {
     (vectors + accel_bias.norm_squared() + attitude.norm_squared() + height + x + y).is_finite()
 }
 
-/// Two corrections of one step: camera and gyro put right what is horizontal, ranges what is vertical.
+/// Combines two corrections of one step. Those of camera and gyro are horizontal, those of the
+/// range vertical.
 fn both(first: &EstimateCorrection, second: &EstimateCorrection) -> EstimateCorrection {
     EstimateCorrection {
         turn: first.turn + second.turn,
@@ -310,29 +313,30 @@ fn both(first: &EstimateCorrection, second: &EstimateCorrection) -> EstimateCorr
     }
 }
 
-/// Sensors that are not left out.
+/// Sensors without a finding.
 #[derive(Clone, Copy)]
 struct Trusted {
     range: bool,
     flow: bool,
 }
 
-/// What the hypotheses of a step come to.
+/// Collected results of the hypotheses in one step.
 struct Answers<'a> {
     findings: &'a mut SensorFindings,
-    /// Do camera and range fit what they should measure? Whatever misfits wins.
+    /// Consistency of camera and range; an inconsistent result takes precedence.
     fits: [Option<bool>; 2],
     correction: Option<EstimateCorrection>,
-    /// The gyro's zero was found to have moved in this step.
+    /// A shift of the gyro's zero was found in this step.
     gyro: bool,
     now: Instant,
 }
 
 impl Answers<'_> {
-    /// Asks a hypothesis. When it begins to hold, its sensor has that finding, and the estimate is put
-    /// right.
+    /// Tests a hypothesis. When it begins to hold, sets the finding of its sensor and adds its
+    /// correction.
     fn ask<H: Hypothesis>(&mut self, hypothesis: &mut H, config: &MonitorConfig, seen: &Evidence<'_>) {
-        // What looked like the camera was the gyro; and a vehicle without a range finder has none that is wrong.
+        // A shift of the gyro explains the camera's residual; without a range finder its hypotheses
+        // are meaningless.
         if H::SENSOR != Sensor::Range && self.gyro || H::SENSOR == Sensor::Range && !seen.has_range {
             return;
         }
@@ -357,7 +361,7 @@ impl Answers<'_> {
             Sensor::Range => &mut self.findings.range,
             Sensor::Flow => &mut self.findings.flow,
         };
-        // A zero that moves once more is put right once more.
+        // A gyro may shift again, and each shift needs its correction.
         let begins = health.finding == Finding::None || H::FINDING == Finding::Shifted;
         if begins {
             *health = Health { finding: H::FINDING, since: self.now };

@@ -1,67 +1,67 @@
-//! Dead reckoning by gyro and accelerometer alone, from an estimate on.
+//! Dead reckoning by gyro and accelerometer, started from an estimate.
 //!
-//! No camera and no range finder touches a [`Reckoner`] after it has begun, so that what they
-//! measure can be compared with it. It is worth something for some seconds: half a degree of tilt
-//! makes 0.09 m/s of velocity in each. Two of them run, and in turn begin anew from the estimate: one
-//! is older than [`HALF`] from then on, and none older than twice that. A sensor that goes wrong is
-//! therefore compared with a state from before, for [`HALF`] at least.
+//! Camera and range finder do not affect a [`Reckoner`] after its start, so their data can be
+//! compared with it. Its useful life is some seconds: half a degree of tilt error adds 0.09 m/s per
+//! second. Two of them run and restart from the estimate in turn: after the first [`HALF`], one is
+//! always older than that, and none older than twice that. A sensor that fails is therefore
+//! compared with a state from before the failure for at least [`HALF`].
 //!
-//! On a vehicle that stands both begin anew all the time, and after a gap in the samples or a blow that
-//! the accelerometer may not have measured whole.
+//! Both restart continuously while the vehicle stands, and after a gap in the samples or a blow
+//! that may have clipped the accelerometer.
 
 use crate::config::MonitorConfig;
 use stampfly_types::messages::{ImuData, StateEstimate};
 use stampfly_types::{GRAVITY, Instant, Quat, Stamped, Vec3, math};
 
-/// The younger of two reckoners becomes so old, s, before the older one begins anew.
+/// Age of the younger reckoner at which the older one restarts, s.
 pub const HALF: f32 = 1.5;
-/// Samples are integrated in blocks of this length, s: four at 400 Hz.
+/// Length of an integration block, s: four samples at 400 Hz.
 const BLOCK: f32 = 9e-3;
-/// After a longer gap in the samples nothing is reckoned on from before it, s.
+/// Longest interval between samples that is integrated, s. A longer one restarts both reckoners.
 const LONGEST_STEP: f32 = 0.05;
 
-/// One standard deviation each of what a reckoner begins with.
+/// Initial standard deviations of a reckoner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sigmas {
     /// Horizontal velocity, m/s.
     pub velocity: f32,
-    /// Horizontal acceleration: of tilt, accelerometer and its vibration, m/s².
+    /// Horizontal acceleration, m/s²: tilt, accelerometer bias and vibration.
     pub acceleration: f32,
-    /// Bias of the gyro about roll and pitch, rad/s.
+    /// Gyro bias about roll and pitch, rad/s.
     pub gyro_bias: f32,
-    /// Bias about yaw, rad/s.
+    /// Gyro bias about yaw, rad/s.
     pub yaw_bias: f32,
 }
 
-/// Attitude and velocity, reckoned from an estimate on.
+/// Attitude and velocity by dead reckoning.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reckoner {
-    /// Time since that estimate, s.
+    /// Time since the start, s.
     pub age: f32,
     /// Body FRD → world NED.
     pub attitude: Quat,
     /// World NED, m/s.
     pub velocity: Vec3,
-    /// The velocity it began with, m/s.
+    /// Initial velocity, m/s.
     pub began: Vec3,
-    /// Biases of that estimate, body FRD, rad/s and m/s².
+    /// Gyro bias of the initial estimate, body FRD, rad/s.
     pub gyro_bias: Vec3,
-    /// See [`gyro_bias`](Self::gyro_bias).
+    /// Accelerometer bias of the initial estimate, body FRD, m/s².
     pub accel_bias: Vec3,
-    /// How uncertain it was when it began.
+    /// Initial uncertainty.
     pub sigmas: Sigmas,
-    /// It began on a vehicle that stood, whose tilt gravity shows.
+    /// It started on a standing vehicle, whose tilt is known from gravity.
     pub stood: bool,
-    /// Variance of the velocity along both axes that noise of the accelerometer has added up to, (m/s)².
+    /// Velocity variance of both axes accumulated from accelerometer noise, (m/s)².
     pub walk: f32,
-    /// How far it has turned, by axis, rad: what turns back and forth takes it back.
+    /// Net rotation per axis, rad; a turn and its return cancel, as their scale errors do.
     pub swept: Vec3,
 }
 
 impl Reckoner {
-    /// From this estimate on, which is so uncertain.
+    /// Starts from an estimate with this uncertainty.
     #[must_use]
     pub fn new(estimate: &StateEstimate, sigmas: Sigmas) -> Self {
         let StateEstimate { attitude, velocity, gyro_bias, accel_bias, .. } = *estimate;
@@ -79,11 +79,11 @@ impl Reckoner {
         }
     }
 
-    /// Goes on by `dt` seconds, in which gyro and accelerometer read this much in the mean, rad/s and
-    /// m/s². `noise`: square of the change of that force along body x and y since the last time,
-    /// (m/s²)², of which half is the variance of each.
+    /// Integrates `dt` seconds with mean rate, rad/s, and mean specific force, m/s². `noise`:
+    /// squared change of that force along body x and y since the last block, (m/s²)²; half of it is
+    /// the variance of each.
     pub fn advance(&mut self, rate: &Vec3, force: &Vec3, noise: f32, dt: f32) {
-        // The mean force acts in the attitude of the middle.
+        // The mean force acts in the attitude at the middle of the block.
         let turn = (rate - self.gyro_bias) * dt;
         let half = turn * 0.25;
         let half = Quat::new_unchecked(1.0, half.x, half.y, half.z).normalize();
@@ -96,29 +96,30 @@ impl Reckoner {
         self.age += dt;
     }
 
-    /// Standard deviation of the horizontal acceleration that the gyro's zero has made by now, m/s²: it
-    /// turns the tilt, and gravity with it.
+    /// Standard deviation of the horizontal acceleration due to the gyro bias, m/s²: the bias tilts
+    /// the attitude, and gravity with it.
     #[must_use]
     pub fn drift(&self) -> f32 {
         GRAVITY * self.sigmas.gyro_bias * self.age
     }
 
-    /// Variance of the horizontal acceleration that tilt and accelerometer had from the beginning, (m/s²)².
+    /// Variance of the horizontal acceleration due to the initial tilt and the accelerometer,
+    /// (m/s²)².
     #[must_use]
     pub fn tilted(&self) -> f32 {
         self.sigmas.acceleration * self.sigmas.acceleration
     }
 
-    /// Variance of the velocity that the heading has turned aside by now, (m/s)²: the gyro's zero about
-    /// yaw turns what has been gained since the beginning.
+    /// Velocity variance due to the yaw bias, (m/s)²: it rotates the velocity gained since the
+    /// start.
     #[must_use]
     pub fn aside(&self) -> f32 {
         let turned = self.sigmas.yaw_bias * self.age;
         turned * turned * (self.velocity - self.began).horizontal().norm_squared()
     }
 
-    /// Variance of the difference between a sound camera's velocity and this one, along both axes
-    /// together, (m/s)², but for what single readings are wrong by.
+    /// Variance of the difference between a healthy camera's velocity and this one, sum of both
+    /// axes, (m/s)², without the error of single readings.
     #[must_use]
     pub fn variance(&self, config: &MonitorConfig, velocity: [f32; 2]) -> f32 {
         let square = |value: f32| value * value;
@@ -133,14 +134,14 @@ impl Reckoner {
     }
 }
 
-/// The two of them, and the inertial samples that they have not used yet.
+/// The two reckoners and the inertial samples of the unfinished block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reckoners {
     pair: [Reckoner; 2],
-    /// Which of them is older.
+    /// Index of the older one.
     older: usize,
-    /// The velocity of the estimate less theirs, at the end of the last block, m/s.
+    /// Velocity of the estimate minus theirs at the end of the last block, m/s.
     apart: [Vec3; 2],
     last: Option<Instant>,
     elapsed: f32,
@@ -153,7 +154,7 @@ pub struct Reckoners {
     has_begun: bool,
 }
 
-/// What has begun anew in a step.
+/// Restarts in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Restart {
     /// Neither.
@@ -165,7 +166,7 @@ pub enum Restart {
 }
 
 impl Reckoners {
-    /// The one with this index, 0 or 1.
+    /// Reckoner 0 or 1.
     #[must_use]
     pub fn get(&self, index: usize) -> &Reckoner {
         let [first, second] = &self.pair;
@@ -178,32 +179,32 @@ impl Reckoners {
         self.older
     }
 
-    /// The estimate's velocity less that of a reckoner, world NED, m/s.
+    /// Velocity of the estimate minus that of a reckoner, world NED, m/s.
     #[must_use]
     pub fn apart(&self, index: usize) -> Vec3 {
         let [first, second] = self.apart;
         if index == 0 { first } else { second }
     }
 
-    /// Raw mean rate some 10 ms ago, which a picture that comes now shows, rad/s.
+    /// Raw mean rate some 10 ms ago, the time of the frame that arrives now, rad/s.
     #[must_use]
     pub fn turning(&self) -> Vec3 {
         (self.turns[0] + self.turns[1]) * 0.5
     }
 
-    /// How fast that changes, rad/s².
+    /// Rate of change of [`turning`](Self::turning), rad/s².
     #[must_use]
     pub fn turning_change(&self) -> Vec3 {
         (self.turns[0] - self.turns[1]) / BLOCK
     }
 
-    /// Has an estimate been seen?
+    /// Whether an estimate has been received.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.has_begun
     }
 
-    /// Both begin anew with this estimate. `stood`: of a vehicle that stands.
+    /// Restarts both from this estimate. `stood`: the vehicle stands.
     pub fn begin(&mut self, estimate: &StateEstimate, sigmas: Sigmas, stood: bool) {
         self.pair = [Reckoner { stood, ..Reckoner::new(estimate, sigmas) }; 2];
         self.apart = [Vec3::zeros(); 2];
@@ -211,8 +212,8 @@ impl Reckoners {
         (self.older, self.has_begun) = (1, true);
     }
 
-    /// Takes inertial samples and the estimate that followed from them, which is so uncertain. A force
-    /// beyond `clips` along any axis, m/s², may have been larger than it reads.
+    /// Processes inertial samples and the estimate after them, with its uncertainty. A force above
+    /// `clips`, m/s², along any axis may have been clipped.
     pub fn step(
         &mut self,
         samples: &[Stamped<ImuData>],
@@ -226,7 +227,7 @@ impl Reckoners {
             let last = self.last.replace(*at).unwrap_or(*at);
             let dt = at.since(last).seconds();
             gap |= dt > LONGEST_STEP;
-            // A sample that is no number says nothing about its time.
+            // A sample that is not finite has no usable time either.
             if !(data.accel.norm_squared() + data.gyro.norm_squared()).is_finite() {
                 continue;
             }
@@ -236,7 +237,7 @@ impl Reckoners {
             self.force += data.accel * dt;
         }
         if gap {
-            // What the vehicle did meanwhile is not known.
+            // The motion during the gap is unknown.
             self.begin(estimate, sigmas(), stands);
             return Restart::Both;
         }
@@ -278,8 +279,8 @@ mod tests {
     const DT: f32 = 0.0025;
     const SIGMAS: Sigmas = Sigmas { velocity: 0.03, acceleration: 0.1, gyro_bias: 0.002, yaw_bias: 0.002 };
 
-    /// Steps through these seconds of samples that a function of time gives, with an estimate that is
-    /// another one. How often did one begin anew?
+    /// Feeds `seconds` of samples given as a function of time, with an independent estimate.
+    /// Returns the number of restarts.
     fn fly(
         reckoners: &mut Reckoners,
         seconds: f32,
@@ -296,7 +297,7 @@ mod tests {
         restarts
     }
 
-    /// A vehicle that turns about x at this rate and pushes along its own axis with its weight.
+    /// A vehicle that turns about x at this rate, with a thrust of one g.
     fn turns(rate: f32) -> impl Fn(f32) -> ImuData {
         move |_| ImuData { accel: Vec3::new(0.0, 0.0, -GRAVITY), gyro: Vec3::new(rate, 0.0, 0.0), ..ImuData::default() }
     }
@@ -311,7 +312,7 @@ mod tests {
             let angle = rate * reckoner.age;
             let off = reckoner.attitude.angle_to(&Quat::from_scaled_axis(Vec3::new(angle, 0.0, 0.0)));
             assert!(off < 2e-3, "{rate} rad/s: {off} rad");
-            // Its thrust leans with it.
+            // The thrust tilts with the body.
             let east = GRAVITY * (1.0 - math::cos(angle)) / rate;
             assert!((reckoner.velocity.y - east).abs() < 0.02, "{rate} rad/s: {:?}", reckoner.velocity);
         }

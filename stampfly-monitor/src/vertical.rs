@@ -1,55 +1,56 @@
-//! What is seen along the vertical: ranges, and how the estimate moves with them.
+//! Evidence along the vertical: ranges, and how the estimate follows them.
 
 use crate::altimeter::{Altimeter, AltitudeReading};
 use stampfly_types::messages::{BaroData, EstimatorStatus, ImuData, StateEstimate, TofData};
 use stampfly_types::{Duration, GRAVITY, Instant, Stamped, Vec3, frame, math};
 
-/// Position of the range finder in the counters of an estimator's status.
+/// Index of the range finder in the counters of the estimator's status.
 const RANGE: usize = 0;
-/// The upward acceleration is integrated in blocks of this length, s.
+/// Length of an integration block of the upward acceleration, s.
 const BLOCK: f32 = 9e-3;
-/// A gap in the samples counts as this long at most, s.
+/// Upper bound on the interval between samples, s.
 const LONGEST_STEP: f32 = 0.05;
-/// Without an altitude for so long nothing is compared with the barometer, s: a dozen readings.
+/// Time without an altitude after which the barometer is not used, s: a dozen readings.
 const NO_ALTITUDE: f32 = 0.5;
-/// Two ranges are at most so far apart, s.
+/// Upper bound on the interval between ranges, s.
 const LONGEST: f32 = 0.2;
-/// A range that has not been used for so long holds neither height nor climb rate, s: six readings.
+/// Time after which a missing range no longer holds height and climb rate, s: six readings.
 const SILENT: f32 = 0.2;
-/// A range so far from its predecessor jumps, m.
+/// Smallest change from the last range that counts as a jump, m.
 const JUMP: f32 = 0.15;
-/// One so far from its predecessor and from what is expected leaps, m: an outlier at first.
+/// Smallest change from the last range and from the expected one that counts as a leap, m: possibly
+/// an outlier.
 const LEAP: f32 = 0.05;
-/// What the climb rate may be wrong by, in standard deviations, moves the range as well.
+/// Number of standard deviations of the climb rate that are allowed to move the range in addition.
 const SIGMAS: f32 = 3.0;
-/// A reset that changes the height by less, m, has not moved the estimate: it falls by as much in a
-/// step of 2.5 ms at 4 m/s.
+/// Smallest change of the height that counts as a reset, m. At 4 m/s the vehicle falls by as much
+/// in a step of 2.5 ms.
 const MOVED: f32 = 0.01;
-/// Rejected ranges, and heights that were moved, count for this long.
+/// Time for which rejected ranges and resets are remembered.
 const REMEMBERED: Duration = Duration::from_secs(3);
 
-/// A range that came in a step, whether the estimator compares it or not, as it does not with a window
-/// that reports itself.
+/// Repetitions of a range, whether the estimator compares it or not; it does not compare a
+/// reflection from the sensor's window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeRepeat {
-    /// Number of readings before it that had the same value.
+    /// Number of preceding readings with the same value.
     pub count: u32,
-    /// It is far from the one before.
+    /// It is far from the last one.
     pub jumps: bool,
 }
 
-/// A range that the estimator has compared in a step.
+/// A range that the estimator has compared in this step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeReading {
     /// Along the beam, m.
     pub distance: f32,
-    /// What the estimate makes it, m.
+    /// Range predicted by the estimate, m.
     pub expected: f32,
-    /// Time since the one before, s.
+    /// Time since the last one, s.
     pub dt: f32,
-    /// It is far from the one before, by more than the vehicle has moved.
+    /// The change from the last one exceeds `JUMP` and the motion of the vehicle.
     pub jumps: bool,
-    /// It is nearer to that, and just as far from what is expected.
+    /// The change exceeds `LEAP`, and so does the difference from the expected range.
     pub leaps: bool,
     /// The estimator has rejected it.
     pub rejected: bool,
@@ -58,13 +59,13 @@ pub struct RangeReading {
 /// A block of inertial samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
-    /// Its length, s.
+    /// Length, s.
     pub dt: f32,
-    /// By how much the upward velocity changed in it, no bias removed, m/s.
+    /// Change of the upward velocity, bias included, m/s.
     pub change: f32,
 }
 
-/// What is remembered along the vertical.
+/// State of the vertical evidence.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Vertical {
@@ -72,24 +73,25 @@ pub(crate) struct Vertical {
     last: Option<Instant>,
     elapsed: f32,
     force: Vec3,
-    /// Height and depth of the estimate a step ago, m.
+    /// Height and altitude of the last estimate, m.
     before: Option<[f32; 2]>,
-    /// Ranges that the estimator has looked at, and rejected, and how often it has reset its state.
+    /// The estimator's counters of ranges compared and rejected, and of resets.
     tested: u32,
     refused: u32,
     resets: u32,
-    /// It has reset its state to the range in this step.
+    /// The estimator has reset its state to the range in this step.
     reset: bool,
     /// The last range, m.
     newest: f32,
-    /// The last one that was compared, and what was expected of it, m.
+    /// The last compared range and its prediction, m.
     distance: f32,
     expected: f32,
     range_at: Option<Instant>,
     repeats: u32,
-    /// When the estimator rejected one last.
+    /// Time of the last rejection.
     rejected: Option<Instant>,
-    /// How far the height was moved lately, upwards, m, and how often height or surface were.
+    /// Recent upward displacement of the estimate by resets, m, and number of resets of height or
+    /// surface.
     pub(crate) moved: f32,
     pub(crate) moves: u32,
     baro_at: Option<Instant>,
@@ -100,23 +102,23 @@ impl Vertical {
         Self { altimeter: Altimeter::airborne(), ..Self::default() }
     }
 
-    /// Is there a range finder at all?
+    /// Whether the vehicle has a range finder.
     pub(crate) fn has_range(&self) -> bool {
         self.range_at.is_some()
     }
 
-    /// A range was found to be wrong, or is used again: what was remembered of it is over.
+    /// Clears what is remembered of the range, after a finding or its end.
     pub(crate) fn forget(&mut self) {
         (self.moved, self.moves, self.rejected) = (0.0, 0, None);
     }
 
-    /// The estimate has been put right, and is `down` lower than it was, m.
+    /// Continues from a corrected estimate, which is `down` metres lower than before.
     pub(crate) fn see(&mut self, corrected: &StateEstimate, down: f32) {
         self.before = Some([corrected.height - down, -corrected.position.z - down]);
         self.altimeter.climb = -corrected.velocity.z;
     }
 
-    /// Takes the inertial samples of a step.
+    /// Processes the inertial samples of a step.
     pub(crate) fn inertial(
         &mut self,
         now: Instant,
@@ -143,7 +145,7 @@ impl Vertical {
         let (dt, force) = (core::mem::take(&mut self.elapsed), core::mem::take(&mut self.force));
         let up = -estimate.attitude.transform_vector(&force).z - GRAVITY * dt;
         if self.baro_at.is_some_and(|at| now.since(at).seconds() > NO_ALTITUDE) {
-            // The accelerometer alone drifts away.
+            // The accelerometer alone drifts.
             self.altimeter.restart(-estimate.accel_bias.z);
             self.baro_at = None;
         }
@@ -157,7 +159,7 @@ impl Vertical {
         Some(Block { dt, change: up })
     }
 
-    /// Has the estimate's height, or that of the surface below it, been reset to the range?
+    /// Detects a reset of the estimate's height, or of the surface below it, to the range.
     fn see_moves(&mut self, estimate: &StateEstimate, stands: bool) {
         let now = [estimate.height, -estimate.position.z];
         let reset = core::mem::take(&mut self.reset) && !stands;
@@ -168,7 +170,7 @@ impl Vertical {
         self.moves += u32::from(surface != 0.0 || moved != 0.0);
     }
 
-    /// Takes the newest range, if there is one in this step.
+    /// Processes the newest range of a step.
     pub(crate) fn range(
         &mut self,
         at: Instant,
@@ -192,8 +194,8 @@ impl Vertical {
         self.reset = resets != status.resets;
         let silence = self.range_at.map(|last| at.since(last).seconds());
         self.range_at = Some(at);
-        // What the vehicle itself moves by is no jump: it falls at 5 m/s, and leans to the other side
-        // within two readings. Nor is what it did while there was none.
+        // The vehicle's own motion is no jump: it may fall at 5 m/s, or change its lean between two
+        // readings. The same holds for motion during a silence.
         let moved = expected - self.expected;
         let change = math::smaller((distance - self.distance).abs(), (distance - self.distance - moved).abs());
         let follows = silence.is_some_and(|silence| silence < SILENT);
@@ -210,7 +212,7 @@ impl Vertical {
         (Some(RangeRepeat { count, jumps }), Some(reading))
     }
 
-    /// Takes the newest altitude.
+    /// Processes the newest altitude of a step.
     pub(crate) fn altitude(&mut self, baro: Option<&Stamped<BaroData>>, stands: bool) -> Option<AltitudeReading> {
         let Stamped { at, data, .. } = baro.filter(|baro| baro.data.altitude.is_finite())?;
         let last = self.baro_at.replace(*at).unwrap_or(*at);

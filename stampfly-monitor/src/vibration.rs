@@ -1,13 +1,13 @@
-//! How much a signal changes from sample to sample.
+//! Mean square sample-to-sample change of a signal.
 
 use stampfly_types::{Instant, Vec3};
 
-/// Time constant of the mean, s: a few periods of a propeller.
+/// Time constant of the mean, s: a few propeller periods.
 const MEAN: f32 = 0.05;
-/// A gap counts as this long at most, s.
+/// Upper bound on the interval between samples, s.
 const LONGEST_STEP: f32 = 0.05;
 
-/// Mean square of the change from sample to sample, per axis.
+/// Mean square of the change from sample to sample, averaged over the axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Vibration {
@@ -16,7 +16,7 @@ pub(crate) struct Vibration {
 }
 
 impl Vibration {
-    /// Takes the next sample. One that is no number is left out.
+    /// Adds the next sample. Values that are not finite are skipped.
     pub(crate) fn add(&mut self, at: Instant, sample: &Vec3) {
         if !sample.norm_squared().is_finite() {
             return;

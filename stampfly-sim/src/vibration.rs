@@ -7,8 +7,8 @@
 //! rectification that all recorded flights show (about +0.8 m/s² on z).
 //!
 //! Sampled at the chip's rate before decimation, so aliasing below the control loop's Nyquist
-//! frequency is real and follows the rotors. The amplitudes are fitted to recorded flights; `cargo
-//! run --release -p stampfly-lab --example spectra` repeats the comparison.
+//! frequency is real and follows the rotors. The amplitudes are fitted to recorded flights;
+//! `cargo run --release --manifest-path lab/Cargo.toml --example spectra` repeats the comparison.
 
 use crate::noise::Noise;
 use crate::normals::Normals;

@@ -1,28 +1,30 @@
-//! Airspeed along the nose: the velocity relative to the air, and with it the wind.
+//! Airspeed along the nose: a measurement of the velocity relative to the air, and of the wind.
 //!
-//! z = x_bᵀ·Rᵀ·(v − w): the row is that of [`velocity::body`] for a vehicle that moves by v − w, and against it that of the wind's two level
-//! components. The wind is an estimate of its own ([`Wind`]), held by whoever has the sensor, so that a vehicle without one
-//! pays nothing: while a receiver shows the velocity, airspeeds show the wind, and when it is silent the wind
-//! that was learnt shows the velocity, no better than it is known.
+//! z = x_bᵀ·Rᵀ·(v − w). The row is that of [`velocity::body`] for a vehicle that moves with v − w;
+//! the two horizontal components of the wind enter with the opposite sign. The wind is a separate
+//! estimate ([`Wind`]) that the caller keeps, so that a vehicle without the sensor pays nothing.
+//! While a receiver measures the velocity, airspeeds estimate the wind. When the receiver is
+//! silent, the estimated wind turns airspeeds into velocities, with the uncertainty of the wind
+//! added.
 //!
-//! | in [`Eskf::fuse_airspeed`](crate::Estimator::fuse_airspeed) | condition |
-//! |---|---|
-//! | start | north is known, at most `horizon` old, a speed that is finite |
-//! | learns the wind | a velocity from outside is younger than two seconds; that the nose has pointed elsewhere shows the other component |
-//! | shows the velocity | otherwise, with a test ratio of at most one |
-//! | stop | no condition of its own; never a reset |
+//! Conditions in [`Eskf::fuse_airspeed`](crate::Estimator::fuse_airspeed):
+//! - **Start**: north is known, the speed is finite and at most `horizon` old.
+//! - **Estimates the wind** while an external velocity is younger than two seconds. The second
+//!   component of the wind becomes observable when the nose points in another direction.
+//! - **Corrects the velocity** otherwise, with a test ratio of at most one.
+//! - **Stop**: no further condition. There is no reset.
 //!
-//! Not for a vehicle that hovers: below some 5 m/s a pitot tube measures nothing.
+//! Not for a vehicle that hovers: a pitot tube has no usable reading below about 5 m/s.
 
 use super::{Row, velocity};
 use crate::filter::NominalState;
 
-/// First standard deviation of the wind along each axis, m/s: a fresh breeze.
+/// Initial standard deviation of the wind along each axis, m/s: a fresh breeze.
 const FIRST: f32 = 6.0;
-/// Random walk of the wind, m/s/√s: one metre per second in a hundred seconds. EKF2 takes the same (`EKF2_WIND_NSD` 0.1).
+/// Random walk of the wind, m/s/√s: 1 m/s in 100 s, the value of EKF2 (`EKF2_WIND_NSD` 0.1).
 const WALK: f32 = 0.1;
 
-/// Predicted airspeed in this wind, m/s north and east.
+/// Predicted airspeed for a wind of `[north, east]`, m/s.
 #[must_use]
 pub fn along_nose(state: &NominalState, [north, east]: [f32; 2]) -> Row {
     let mut moving = *state;
@@ -32,12 +34,13 @@ pub fn along_nose(state: &NominalState, [north, east]: [f32; 2]) -> Row {
     nose
 }
 
-/// The wind, as airspeeds show it.
+/// Estimate of the horizontal wind from airspeeds.
 ///
 /// ```
 /// use stampfly_eskf::aid::airspeed::Wind;
 /// let mut wind = Wind::default();
-/// // To the north at 12 m/s over ground the air is met at 15, to the east at 12: three metres per second from the north.
+/// // Over ground at 12 m/s, the airspeed is 15 to the north and 12 to the east: wind from the
+/// // north, 3 m/s.
 /// for _ in 0..200 {
 ///     wind.learn(0.1, [1.0, 0.0], 12.0 - 15.0, 0.25);
 ///     wind.learn(0.1, [0.0, 1.0], 12.0 - 12.0, 0.25);
@@ -49,47 +52,50 @@ pub fn along_nose(state: &NominalState, [north, east]: [f32; 2]) -> Row {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wind {
     value: [f32; 2],
-    /// Variances along north and east, and covariance, (m/s)².
+    /// Variances along north and east, and their covariance, (m/s)².
     north: f32,
     east: f32,
     both: f32,
 }
 
 impl Default for Wind {
-    /// Nothing is known.
+    /// Unknown wind.
     fn default() -> Self {
         Self { value: [0.0; 2], north: FIRST * FIRST, east: FIRST * FIRST, both: 0.0 }
     }
 }
 
 impl Wind {
-    /// Velocity of the air, m/s north and east: where it goes, not where it comes from.
+    /// Velocity of the air, m/s north and east: the direction in which it moves, not from which it
+    /// comes.
     #[must_use]
     pub const fn velocity(&self) -> [f32; 2] {
         self.value
     }
 
-    /// Standard deviation of the component that is known worse, m/s.
+    /// Standard deviation of the less certain component, m/s.
     #[must_use]
     pub fn sigma(&self) -> f32 {
         stampfly_types::math::sqrt(self.north.max(self.east))
     }
 
-    /// Variance along a level direction, (m/s)².
+    /// Variance along a horizontal unit vector, (m/s)².
     #[must_use]
     pub fn variance_along(&self, [x, y]: [f32; 2]) -> f32 {
         x * x * self.north + 2.0 * x * y * self.both + y * y * self.east
     }
 
-    /// Lets `seconds` pass.
+    /// Propagates the variances by `seconds`.
     pub fn propagate(&mut self, seconds: f32) {
         let walk = WALK * WALK * seconds.max(0.0);
+        // Bounded: no wind is less certain than at the start, however long the tube is silent.
         self.north = (self.north + walk).min(FIRST * FIRST);
         self.east = (self.east + walk).min(FIRST * FIRST);
     }
 
-    /// Takes the difference of ground speed and airspeed along a level direction, m/s, of this variance, (m/s)², `seconds` after the
-    /// one before. A variance that is not positive changes nothing.
+    /// Updates with the difference of ground speed and airspeed along a horizontal unit vector,
+    /// m/s, and its variance, (m/s)², `seconds` after the last update. Ignored if the variance is
+    /// not positive or a value is not finite.
     pub fn learn(&mut self, seconds: f32, direction: [f32; 2], difference: f32, variance: f32) {
         self.propagate(seconds);
         let [x, y] = direction;

@@ -1,34 +1,35 @@
-//! An attitude that is measured from outside: motion capture, a second estimator.
+//! Attitude measured from outside: motion capture or a second estimator.
 //!
-//! The error between the estimate q and the measurement q_m is q⁻¹ ⊗ q_m = (1, θ/2) for a small body rotation θ.
-//! The reading is that θ, the prediction zero; correcting the state by θ takes it away, so the Jacobian is the identity
-//! in the attitude errors. Its length is the sine, not the angle, of the error: within 2 % to 0.35 rad, and
-//! always of the right sign.
+//! For a small body rotation θ between the estimate q and the measurement q_m, q⁻¹ ⊗ q_m = (1,
+//! θ/2). The reading is θ, the prediction is zero, and a correction by θ removes the difference, so
+//! the Jacobian is the identity in the attitude errors. The length of the reading is twice the sine
+//! of half the error, not the error: within 2 % up to 0.35 rad, and always of the right sign.
 //!
-//! | external attitude in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | initialised, finite, new, at most `horizon` old |
-//! | continue | the same, and a joint test ratio of the three axes of at most one |
-//! | stop | no condition of its own: inactive one second after the last accepted sample |
-//! | reset | rejected for longer than `external_lockout`: attitude to the sample, history emptied; its variance reset, velocity and gyro bias inflated |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**: initialised, finite, new, at most `horizon` old.
+//! - **Continue**: the same, and a joint test ratio of the three axes of at most one.
+//! - **Stop**: no further condition. Inactive one second after the last accepted sample.
+//! - **Reset**: rejected for longer than `external_lockout`. The attitude is set to the sample, the
+//!   history is cleared, the attitude variance is reset, velocity and gyro bias are inflated.
 
 use super::Row;
 use crate::filter::ATTITUDE;
 use crate::filter::state::multiply;
 use stampfly_types::Vec3;
 
-/// Rotation from the attitude `estimated` to the attitude `measured` (both w, x, y, z), body, rad.
+/// Rotation vector from attitude `estimated` to attitude `measured` (both w, x, y, z), body axes,
+/// rad.
 #[inline]
 #[must_use]
 pub fn error(estimated: [f32; 4], measured: [f32; 4]) -> Vec3 {
     let [w, x, y, z] = estimated;
     let [w, x, y, z] = multiply([w, -x, -y, -z], measured);
-    // A quaternion and its negative are the same attitude: take the short way.
+    // A quaternion and its negative are the same attitude: choose the shorter rotation.
     let sign = if w < 0.0 { -2.0 } else { 2.0 };
     Vec3::new(x, y, z) * sign
 }
 
-/// The rows for the three axes of that rotation: predicted to be zero.
+/// Rows of the three axes of that rotation, with prediction zero.
 #[inline]
 #[must_use]
 pub fn rows() -> [Row; 3] {
@@ -49,7 +50,7 @@ mod tests {
         by[ATTITUDE..ATTITUDE + 3].copy_from_slice(&[0.01, -0.02, 0.015]);
         let mut moved = state;
         moved.correct(&by);
-        // The attitude of the moved state differs by just that much, for either sign of the quaternion.
+        // The error equals the applied rotation, for either sign of the quaternion.
         for sign in [1.0, -1.0] {
             let error = error(state.attitude, moved.attitude.map(|v| sign * v));
             for axis in 0..3 {

@@ -1,36 +1,41 @@
-//! Barometric altitude as vertical position.
+//! Barometric altitude as a measurement of the vertical position.
 //!
-//! h = −p_z + offset, so the only derivative by the states is −1. Pressure drifts by metres an hour, so the offset is
-//! an estimate of its own ([`Offset`]): a random walk with a variance, which adds to the sensor's noise as far as the
-//! filter is concerned, and is updated with the same innovation. It is kept apart from the fifteen states: what couples
-//! them is a drift of centimetres a minute beside a range that is good to a centimetre.
+//! h = −p_z + offset, so the only derivative is −1. Air pressure drifts by metres an hour. The
+//! offset is therefore estimated, too ([`Offset`]): a random walk whose variance is added to the
+//! sensor noise and which is updated with the same innovation. It is not one of the fifteen states:
+//! its correlation with them is negligible, because it drifts by centimetres a minute while a range
+//! is accurate to a centimetre.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | `baro_enable`; the first altitude defines the offset |
-//! | continue | a test ratio of at most one: updates the height and the offset |
-//! | beside a receiver | with `baro_backup`: it only learns its offset while an outside height is younger than two seconds |
-//! | stop | not finite or not new: refused at once, inactive one second after the last accepted altitude |
-//! | reset | rejected for longer than `lockout`: the offset to the altitude, the state stays; not counted towards divergence |
-//! | leaves the ground | starting propellers move the pressure: the offset's variance grows by `baro_wash`², and so does the noise, less with the height ([`wash`]) |
-//! | origin reset by command | the offset shifts with the origin |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**: `baro_enable`. The first altitude defines the offset.
+//! - **Continue**: a test ratio of at most one. Updates height and offset.
+//! - **With a receiver** and `baro_backup`: updates only the offset while an external height is
+//!   younger than two seconds.
+//! - **Stop**: not finite or not new, refused at once. Inactive one second after the last accepted
+//!   altitude.
+//! - **Reset**: rejected for longer than `lockout`. The offset is set to the altitude, the state is
+//!   unchanged. Not counted towards divergence.
+//! - **Take-off**: starting propellers change the pressure. The offset's variance grows by
+//!   `baro_wash`², and so does the noise near the floor ([`wash`]).
+//! - **Origin reset by command**: the offset moves with the origin.
 
 use super::Row;
 use crate::filter::{NominalState, POSITION};
 
-/// Predicted altitude for an altitude `offset` of the origin, m.
+/// Predicted altitude, where `offset` is the altitude of the origin, m.
 #[inline]
 #[must_use]
 pub fn altitude(state: &NominalState, offset: f32) -> Row {
     Row::new(offset - state.position.z, [(POSITION + 2, -1.0)])
 }
 
-/// Height at which the propellers' pressure is half of what it is at the floor, m. A rotor feels the ground up to about two diameters, and
-/// those of small multirotors have 0.05 to 0.1 m.
+/// Height at which the propellers' pressure has fallen to half of its value at the floor, m. Ground
+/// effect reaches about two rotor diameters, and the rotors of small multirotors measure 0.05 to
+/// 0.1 m.
 const WASH_HEIGHT: f32 = 0.2;
 
-/// Standard deviation of what propellers do to an altitude, m, at this height above the floor, for `floor` at the floor. It fades with the
-/// square of the height.
+/// Standard deviation of the altitude due to propeller wash, m, at `height` metres above the floor;
+/// `floor` is the value at the floor. It decreases with the square of the height.
 #[inline]
 #[must_use]
 pub fn wash(floor: f32, height: f32) -> f32 {
@@ -43,7 +48,8 @@ pub fn wash(floor: f32, height: f32) -> f32 {
 /// ```
 /// use stampfly_eskf::aid::baro::Offset;
 /// let mut offset = Offset::new(120.0, 0.1);
-/// // Ten minutes at 0.02 m/√s: a standard deviation of half a metre, so an innovation of half a metre is mostly drift.
+/// // Ten minutes at 0.02 m/√s: a standard deviation of 0.5 m, so an innovation of 0.5 m is mostly
+/// // drift.
 /// offset.propagate(600.0, 0.02);
 /// offset.update(0.5, 0.01);
 /// assert!((offset.value() - 120.45).abs() < 0.05);
@@ -56,7 +62,7 @@ pub struct Offset {
 }
 
 impl Offset {
-    /// An offset with a first variance, m and m².
+    /// An offset in m with an initial variance in m².
     #[must_use]
     pub const fn new(value: f32, variance: f32) -> Self {
         Self { value, variance }
@@ -74,12 +80,12 @@ impl Offset {
         self.variance
     }
 
-    /// The origin moved down by this much, m.
+    /// Moves the origin down by `down` metres.
     pub fn shift(&mut self, down: f32) {
         self.value -= down;
     }
 
-    /// Inflates its variance by `variance`, m².
+    /// Adds `variance`, m².
     pub fn inflate(&mut self, variance: f32) {
         self.variance += variance;
     }
@@ -89,7 +95,8 @@ impl Offset {
         self.variance += walk * walk * seconds;
     }
 
-    /// Updates the offset with an innovation whose variance, without this offset's own, is `others`.
+    /// Updates with an innovation, m. `others` is the innovation variance without the offset's own
+    /// part, m².
     pub fn update(&mut self, innovation: f32, others: f32) {
         let gain = self.variance / (self.variance + others);
         self.value += gain * innovation;

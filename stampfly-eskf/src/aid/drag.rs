@@ -1,24 +1,25 @@
-//! A multirotor's drag, as the velocity along body x and y through still air.
+//! Drag of a multirotor as a measurement of the velocity along body x and y.
 //!
-//! Propellers push along the body's z. What the accelerometer feels along x and y is the air's drag on rotors and
-//! body, for slow flight in proportion to the velocity: f = −k·v + b, with k in 1/s (P. Martin and E. Salaün, "The True Role of
-//! Accelerometer Feedback in Quadrotor Control", ICRA 2010; R. Leishman et al., "Quadrotors and Accelerometers", IEEE Control
-//! Systems 34(1), 2014). The derivatives are those of the velocity in the body's axes.
+//! Propellers push along body z. The specific force along x and y is the drag of rotors and body,
+//! proportional to the airspeed in slow flight: f = −k·v + b, with k in 1/s (P. Martin and E.
+//! Salaün, "The True Role of Accelerometer Feedback in Quadrotor Control", ICRA 2010; R. Leishman
+//! et al., "Quadrotors and Accelerometers", IEEE Control Systems 34(1), 2014). The derivatives are
+//! those of the velocity in body axes.
 //!
-//! For flight without any measured velocity: it shows which way the vehicle drifts, and that it does not. Wind is an error of
-//! the reading, so in wind the vehicle drifts with it. Not for a body whose propellers stand still, or do not carry it.
+//! Use it for flight without any measured velocity: it bounds the drift of the velocity. Wind is an
+//! error of the reading, so the vehicle drifts with the wind. Not valid while the propellers do not
+//! carry the body.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | `drag` above zero, told to be `flying`, nothing holds the velocity; every fourth sample |
-//! | continue | the same; it is not gated |
-//! | stop | flow, velocity or position was accepted within the last second, or it no longer flies |
+//! Conditions in [`Eskf`](crate::Eskf), every fourth sample, without a gate:
+//! - **Start**: `drag` above zero, commanded `flying`, accelerometer in use, velocity not measured.
+//! - **Stop**: flow, external velocity or position was accepted within the last second, or the
+//!   vehicle no longer flies.
 
 use super::Row;
 use crate::filter::state::Rotation;
 use crate::filter::{ACCEL_BIAS, NominalState};
 
-/// Predicted specific force along body x and y of a multirotor that loses `drag` of its velocity each second, 1/s.
+/// Predicted specific force along body x and y, m/s², for the drag coefficient `drag`, 1/s.
 #[inline]
 #[must_use]
 pub fn specific_force(state: &NominalState, rotation: &Rotation, drag: f32) -> [Row; 2] {

@@ -1,27 +1,30 @@
-//! The magnetic field as a vector: all three axes, tilt included.
+//! The magnetic field as a vector: all three axes, including tilt.
 //!
-//! A field m of the world reads m_b = Rᵀ·m in the body; a small body rotation θ gives (I − \[θ\]×)·m_b =
-//! m_b + \[m_b\]×·θ. Everything is divided by the field's strength, so that readings are directions and the noise is
-//! an angle.
+//! A world field m reads m_b = Rᵀ·m in the body. A small body rotation θ gives (I − \[θ\]×)·m_b =
+//! m_b + \[m_b\]×·θ. Readings are divided by the field strength, so that they are directions and
+//! their noise is an angle.
 //!
-//! For a vehicle whose motors do not bend the field: a rover, a hand-held sensor, a machine with its magnetometer on a
-//! mast. Otherwise use the [`heading`](super::heading), which leaves the tilt alone.
+//! Use it where motors do not distort the field: a rover, a hand-held sensor, a magnetometer on a
+//! mast. Otherwise use [`heading`](super::heading), which does not affect the tilt.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | `mag_enable` with [`MagModel::Field`](crate::MagModel::Field), a calibration with a field, 10 to 100 µT, a horizontal part above 1 µT |
-//! | continue | the same, and a joint test ratio of the three axes of at most one |
-//! | stop | one of these fails: refused at once, inactive one second after the last accepted field |
-//! | inflate | rejected for longer than `lockout`: the heading's variance grows, once per lock-out |
-//! | reset | none: the attitude is never set to the field |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**: `mag_enable` with [`MagModel::Field`](crate::MagModel::Field), a calibration with a
+//!   field, 10 to 100 µT, a horizontal component above 1 µT.
+//! - **Continue**: the same, and a joint test ratio of the three axes of at most one.
+//! - **Stop**: a condition fails, refused at once. Inactive one second after the last accepted
+//!   field.
+//! - **Inflation**: rejected for longer than `lockout`. The heading variance grows, once per
+//!   lock-out.
+//! - **Reset**: none. The attitude is never set to the field.
 
 use super::Row;
 use crate::filter::ATTITUDE;
 use crate::filter::state::{Rotation, rotate_back};
 use stampfly_types::{Vec3, math};
 
-/// Direction of the earth's field, true NED, unit length, at a place with this declination (magnetic north east of true north) and
-/// inclination (below the horizon), rad. Both come from a map, such as the World Magnetic Model.
+/// Direction of the earth's field, true NED, unit length. `declination` (magnetic north east of
+/// true north) and `inclination` (below the horizon) are in rad; take both from a map such as the
+/// World Magnetic Model.
 ///
 /// ```
 /// // Tokyo, 2025: 7.9° west, 50° down.
@@ -35,7 +38,8 @@ pub fn earth(declination: f32, inclination: f32) -> Vec3 {
     Vec3::new(level * cos, level * sin, math::sin(inclination))
 }
 
-/// Predicted direction of the field along body x, y and z, for the direction `reference` (world, unit length).
+/// Predicted direction of the field along body x, y and z for the world direction `reference`, unit
+/// length.
 #[inline]
 #[must_use]
 pub fn direction(rotation: &Rotation, reference: &Vec3) -> [Row; 3] {

@@ -1,28 +1,38 @@
-//! Optical flow over a level surface, as horizontal velocity in the body frame.
+//! Optical flow over a level surface as horizontal velocity in the body frame.
 //!
-//! Turned into angular rate and freed of the body's own rotation, flow times distance is the velocity along body x
-//! and y. The reading compared here is therefore z = distance · (flow rate ∓ body rate), the prediction
-//! v_body = Rᵀ·v. For a small body rotation θ, (R(I + \[θ\]×))ᵀ·v = v_b + \[v_b\]×·θ, which gives the attitude columns;
-//! the velocity columns are the columns of R. The gyro bias enters through the rotation that was removed: the rates
-//! are raw, ω_m = ω + b, so with the bias b the reading along x is v_x − distance·b_y and the one along y is
-//! v_y + distance·b_x. The prediction has the same terms.
+//! Flow as an angular rate, minus the body's own rotation, times the distance is the velocity along
+//! body x and y. The reading is z = distance · (flow rate ∓ body rate), the prediction v_body =
+//! Rᵀ·v. For a small body rotation θ, (R(I + \[θ\]×))ᵀ·v = v_b + \[v_b\]×·θ, which gives the
+//! attitude columns; the velocity columns are the columns of R. The gyro bias enters through the
+//! rotation that was subtracted: the rates are raw, ω_m = ω + b, so with the bias b the reading
+//! along x is v_x − distance·b_y and the one along y is v_y + distance·b_x. The prediction has the
+//! same terms.
 //!
-//! The distance is taken as known; its error is part of the measurement noise (see the filter's configuration).
+//! The distance is treated as known; its error is part of the measurement noise.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m and half the distance, a distance of at least 0.02 m, `flow_min_distance` until a flight has once reached it, and a picture that does not move faster than `flow_max_rate` by the reading or by what is predicted, and half as fast by the other |
-//! | continue | the same, and a joint test ratio of both axes of at most one |
-//! | stop | one of these fails: refused at once, inactive one second after the last accepted sample |
-//! | inflate | the mean of its innovations is biased in flight: tilt and horizontal gyro bias inflated, accelerometer bias reset |
-//! | not corrected | height, climb rate and the vertical bias of the accelerometer, whose uncertainty counts |
-//! | reset | rejected for longer than `lockout`: horizontal velocity to the sample, then the same inflation |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**: valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt
+//!   within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m and
+//!   half the distance, a distance of at least 0.02 m, and of `flow_min_distance` until the flight
+//!   has once reached it.
+//! - **Image motion**: either the measured or the predicted motion may reach `flow_max_rate`, the
+//!   other one half of it.
+//! - **Continue**: the same, and a joint test ratio of both axes of at most one.
+//! - **Stop**: a condition fails, refused at once. Inactive one second after the last accepted
+//!   sample.
+//! - **Inflation**: the mean of the innovations is biased in flight. Tilt and horizontal gyro bias
+//!   are inflated, the accelerometer bias is reset.
+//! - **Considered, not corrected**: height, climb rate and vertical accelerometer bias; their
+//!   uncertainty enters the innovation variance.
+//! - **Reset**: rejected for longer than `lockout`. The horizontal velocity is set to the sample,
+//!   then the same inflation.
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
 use crate::filter::{ATTITUDE, GYRO_BIAS, NominalState, VELOCITY};
 
-/// Predicted velocity along body x and along body y, from `distance` metres to the surface along the beam.
+/// Predicted velocity along body x and y, m/s; `distance` is the distance to the surface along the
+/// beam, m.
 #[inline]
 #[must_use]
 pub fn body_velocity(state: &NominalState, rotation: &Rotation, distance: f32) -> [Row; 2] {
@@ -42,7 +52,8 @@ pub fn body_velocity(state: &NominalState, rotation: &Rotation, distance: f32) -
     ]
 }
 
-/// The reading to compare with: flow rates and the *raw* body rates averaged over the same interval, rad/s.
+/// The reading: flow rates and the *raw* body rates, averaged over the same interval, rad/s, times
+/// the distance, m.
 #[inline]
 #[must_use]
 pub fn measured_velocity(flow_rate: [f32; 2], raw_rate: [f32; 2], distance: f32) -> [f32; 2] {
@@ -63,7 +74,7 @@ mod tests {
 
     #[test]
     fn pure_rotation_measures_no_velocity() {
-        // Pitching up at 0.3 rad/s shows as +0.3 in x, rolling right at 0.2 rad/s as −0.2 in y.
+        // Pitching up at 0.3 rad/s reads +0.3 in x, rolling right at 0.2 rad/s reads −0.2 in y.
         let measured = measured_velocity([0.3, -0.2], [0.2, 0.3], 0.5);
         assert!(measured.iter().all(|v| v.abs() < 1e-7));
     }

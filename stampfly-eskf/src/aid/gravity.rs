@@ -1,25 +1,32 @@
 //! Gravity: the accelerometer as an inclinometer.
 //!
-//! The specific force is the body's own acceleration less gravity, in body axes: f = Rᵀ·(a − g) + b. With
-//! f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the accelerometer bias adds itself.
+//! The specific force is the body's acceleration minus gravity, in body axes: f = Rᵀ·(a − g) + b.
+//! With f₀ = Rᵀ·(a − g), a small body rotation θ gives (I − \[θ\]×)·f₀ = f₀ + \[f₀\]×·θ; the
+//! accelerometer bias is added.
 //!
-//! The acceleration a must come from elsewhere: zero for a body that is stationary or carried gently, the change of a
-//! measured velocity for one that flies (see [`Acceleration`]). Left at zero in flight the model pulls the attitude
-//! towards level, because a multicopter's accelerometer points along its thrust, whatever the tilt.
+//! The acceleration a is an input: zero for a body that is stationary or moved gently, the
+//! derivative of a measured velocity for one that flies (see [`Acceleration`]). With zero in flight
+//! the model pulls the attitude towards level, because a multicopter's accelerometer points along
+//! its thrust, whatever the tilt.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | stationary, or nothing holds the velocity ([`WhenUnaided`](crate::GravityUse::WhenUnaided)), both with every fourth sample; or all samples in flight, by their mean over 10 ms ([`Always`](crate::GravityUse::Always)) |
-//! | continue | the same, and a joint test ratio of the three axes of at most one |
-//! | stop | in flight with `WhenUnaided`: flow, velocity or position was accepted within the last second |
-//! | reset | rejected for longer than four times `lockout`: attitude inflated, velocity to zero with a large variance, accelerometer bias reset; once per lock-out |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**, every fourth sample: stationary, or the velocity is not measured
+//!   ([`WhenUnaided`](crate::GravityUse::WhenUnaided)). With [`Always`](crate::GravityUse::Always):
+//!   all samples in flight, as their mean over 10 ms.
+//! - **Continue**: the same, and a joint test ratio of the three axes of at most one.
+//! - **Stop**, in flight with `WhenUnaided`: flow, external velocity or position was accepted
+//!   within the last second.
+//! - **Reset**: rejected for longer than four times `lockout`. The attitude is inflated, the
+//!   velocity is set to zero with a large variance, the accelerometer bias is reset; once per
+//!   lock-out.
 
 use super::Row;
 use crate::filter::state::{Rotation, rotate_back};
 use crate::filter::{ACCEL_BIAS, ATTITUDE, NominalState};
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// Predicted specific force along body x, y and z of a body that accelerates by `acceleration` (world, m/s²).
+/// Predicted specific force along body x, y and z, m/s², of a body with this `acceleration` (world,
+/// m/s²).
 #[inline]
 #[must_use]
 pub fn specific_force(state: &NominalState, rotation: &Rotation, acceleration: &Vec3) -> [Row; 3] {
@@ -33,16 +40,17 @@ pub fn specific_force(state: &NominalState, rotation: &Rotation, acceleration: &
     ]
 }
 
-/// Bandwidth and damping of the tracker, rad/s and 1: the α = 0.2 and β = 0.02 at 100 Hz of the StampFly's firmware.
+/// Bandwidth of the tracker, rad/s, and its damping ratio: α = 0.2 and β = 0.02 at 100 Hz in the
+/// StampFly's firmware.
 const BANDWIDTH: f32 = 14.0;
 const DAMPING: f32 = 0.7;
-/// Largest acceleration tracked, m/s².
+/// Largest acceleration tracked along an axis, m/s².
 const MAX_ACCELERATION: f32 = 5.0;
-/// Without a velocity for this long the acceleration is zero.
+/// After this time without a velocity the acceleration is zero.
 const TIMEOUT: Duration = Duration::from_micros(200_000);
 
-/// Tracks the acceleration of the body from measured velocities: an α-β tracker (Kalata, "The Tracking Index", IEEE
-/// TAES 20(2), 1984).
+/// Acceleration of the body from measured velocities: an α-β tracker (Kalata, "The Tracking Index",
+/// IEEE TAES 20(2), 1984).
 ///
 /// ```
 /// use stampfly_eskf::aid::gravity::Acceleration;
@@ -63,7 +71,8 @@ pub struct Acceleration {
 }
 
 impl Acceleration {
-    /// Updates with a measured velocity, world, m/s. Restarts after a gap.
+    /// Updates with a measured velocity, world, m/s. Restarts after a gap; ignores samples that are
+    /// not newer.
     pub fn update(&mut self, at: Instant, velocity: Vec3) {
         match self.updated {
             Some(updated) if at <= updated => return,
@@ -71,7 +80,7 @@ impl Acceleration {
                 let dt = at.since(updated).seconds();
                 let predicted = self.velocity + self.acceleration * dt;
                 let error = velocity - predicted;
-                // Stable for every step that is taken: both gains stay below one.
+                // Both gains stay below one, so the tracker is stable for every accepted interval.
                 let phase = (BANDWIDTH * dt).min(0.7);
                 self.velocity = predicted + error * (2.0 * DAMPING * phase).min(1.0);
                 let acceleration = self.acceleration + error * (phase * phase / dt);
@@ -82,7 +91,7 @@ impl Acceleration {
         self.updated = Some(at);
     }
 
-    /// The acceleration, world, m/s²; zero without a recent velocity.
+    /// The acceleration, world, m/s². Zero without a recent velocity.
     #[must_use]
     pub fn at(&self, now: Instant) -> Vec3 {
         if self.updated.is_some_and(|updated| now.since(updated) <= TIMEOUT) {

@@ -1,30 +1,34 @@
 //! Magnetic heading: one row about the vertical, without the tilt.
 //!
-//! The measured field is turned into the world with the estimated attitude; the angle between its horizontal part and
-//! the reference's is the heading error. A small body rotation θ turns the body by R·θ in the world; its vertical
-//! component R₃₁θ_x + R₃₂θ_y + R₃₃θ_z is the heading change. Motor currents bend the field by more than any tilt, so
-//! only this one row is used.
+//! The measured field is rotated into the world with the estimated attitude; the angle between its
+//! horizontal part and that of the reference is the heading error. A small body rotation θ rotates
+//! the body by R·θ in the world; the vertical component R₃₁θ_x + R₃₂θ_y + R₃₃θ_z is the change of
+//! heading. Motor currents distort the field by more than any tilt, so only this row is used. Where
+//! the field is not distorted, [`field`](super::field) uses all three axes.
 //!
-//! | in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | `mag_enable` with [`MagModel::Heading`](crate::MagModel::Heading), a calibration with a field, 10 to 100 µT, a horizontal part above 1 µT |
-//! | continue | the same, and a test ratio of at most one |
-//! | stop | one of these fails: refused at once, inactive one second after the last accepted field |
-//! | inflate | rejected for longer than `lockout`: the heading's variance grows, once per lock-out |
-//! | reset | none: the heading is never set to the field |
+//! Conditions in [`Eskf`](crate::Eskf):
+//! - **Start**: `mag_enable` with [`MagModel::Heading`](crate::MagModel::Heading), a calibration
+//!   with a field, 10 to 100 µT, a horizontal component above 1 µT.
+//! - **Continue**: the same, and a test ratio of at most one.
+//! - **Stop**: a condition fails, refused at once. Inactive one second after the last accepted
+//!   field.
+//! - **Inflation**: rejected for longer than `lockout`. The heading variance grows, once per
+//!   lock-out.
+//! - **Reset**: none. The heading is never set to the field.
 
 use super::Row;
 use crate::filter::ATTITUDE;
 use crate::filter::state::{Rotation, rotate};
 use stampfly_types::{Vec3, math};
 
-/// Heading that the field measures, relative to the reference heading (zero in the true attitude), and its row.
-/// `None` when the field has no usable horizontal part.
+/// Measured heading relative to the heading `reference` (rad), and its row; zero with the true
+/// attitude. `None` if the horizontal component is NaN or at most 1 µT. `field` is in body axes,
+/// µT.
 #[must_use]
 pub fn error(rotation: &Rotation, field: &Vec3, reference: f32) -> Option<Row> {
     let world = rotate(rotation, field);
     let horizontal = world.x * world.x + world.y * world.y;
-    // Less than 1 µT is no direction; neither is what is not a number.
+    // The direction of less than 1 µT is noise. Written so that NaN is refused, too.
     if horizontal.is_nan() || horizontal <= 1.0 {
         return None;
     }
@@ -41,7 +45,7 @@ mod tests {
     use crate::filter::state::rotate_back;
     use crate::filter::{N, NominalState};
 
-    /// The row is exact for rotations about the vertical, which is all it claims.
+    /// The row is exact only for rotations about the vertical, so only those are tested.
     #[test]
     fn jacobian_matches_a_turn_about_the_vertical() {
         let state = crate::aid::numeric::awkward_state();

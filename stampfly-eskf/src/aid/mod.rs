@@ -1,9 +1,11 @@
-//! Measurement models, one a file: what a sensor should read in a given state, and how that changes with the state.
+//! Measurement models, one per file: the predicted reading of a sensor and its derivatives by the
+//! state.
 //!
-//! A model returns rows: the predicted reading and the non-zero entries of its Jacobian with respect to the fifteen
-//! error states. Each file derives its Jacobian in a comment, tests it against numerical differentiation, and lists
-//! when [`Eskf`](crate::Eskf) starts, continues, stops and resets with it. Beyond those conditions every measurement
-//! must be finite, newer than the sensor's last, at most [`horizon`](crate::EskfConfig::horizon) old and at most 0.02 s ahead of the last inertial
+//! A model returns [`Row`]s: the predicted reading and the Jacobian with respect to the fifteen
+//! error states. Each file derives its Jacobian, tests it against numerical differentiation, and
+//! lists the conditions under which [`Eskf`](crate::Eskf) starts, continues, stops and resets with
+//! the sensor. In addition, every measurement must be finite, newer than the sensor's last one, at
+//! most [`horizon`](crate::EskfConfig::horizon) old and at most 0.02 s ahead of the last inertial
 //! sample.
 
 pub mod airspeed;
@@ -23,14 +25,15 @@ use crate::filter::N;
 /// One scalar row of a measurement model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// What the sensor should read.
+    /// Predicted reading of the sensor.
     pub predicted: f32,
-    /// Its derivative by the error states. Most are zero.
+    /// Derivative of the prediction by each error state. Most entries are zero.
     pub jacobian: [f32; N],
 }
 
 impl Row {
-    /// A row from the entries of its Jacobian that are not zero: (state, value). An entry out of range is dropped.
+    /// A row from the non-zero entries of its Jacobian, as (state index, value). Entries with an
+    /// index out of range are ignored.
     #[inline]
     #[must_use]
     pub fn new<const K: usize>(predicted: f32, entries: [(usize, f32); K]) -> Self {
@@ -46,12 +49,12 @@ impl Row {
 
 #[cfg(test)]
 pub(crate) mod numeric {
-    //! The check every Jacobian has to pass.
+    //! Numerical check of Jacobians.
     use super::Row;
     use crate::filter::{N, NominalState};
     use stampfly_types::Vec3;
 
-    /// A state away from every symmetry.
+    /// A state without symmetries.
     pub fn awkward_state() -> NominalState {
         let mut state = NominalState {
             position: Vec3::new(0.3, -0.2, -0.8),

@@ -1,20 +1,20 @@
-//! A position in the world's axes: measured from outside, or a pseudo-measurement.
+//! Position in world axes: measured from outside, or a pseudo-measurement.
 //!
-//! It is the state itself: z = p, so the Jacobian is the identity in the three position errors.
+//! z = p, so the Jacobian is the identity in the three position errors. Used for camera systems,
+//! satellite receivers and the known place of a stationary vehicle.
 //!
-//! A camera system's position, or the place of a stationary vehicle.
-//!
-//! | external position in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | initialised, finite, new, at most `horizon` old |
-//! | continue | the same, and a joint test ratio of the axes given of at most one |
-//! | stop | no condition of its own: inactive `aiding_timeout` after the last accepted sample |
-//! | reset | rejected for longer than `external_lockout`: position to the sample, the surface with it; variance of position and velocity reset, attitude inflated |
+//! Conditions for external positions in [`Eskf`](crate::Eskf):
+//! - **Start**: initialised, finite, new, at most `horizon` old.
+//! - **Continue**: the same, and a joint test ratio of the measured axes of at most one.
+//! - **Stop**: no further condition. Inactive `aiding_timeout` after the last accepted sample.
+//! - **Reset**: rejected for longer than `external_lockout`. The position is set to the sample and
+//!   the surface moves with it; the variances of position and velocity are reset, the attitude is
+//!   inflated.
 
 use super::Row;
 use crate::filter::{NominalState, POSITION};
 
-/// Predicted position, world, m: the state's own.
+/// Predicted position, world, m: that of the state.
 #[inline]
 #[must_use]
 pub fn world(state: &NominalState) -> [Row; 3] {

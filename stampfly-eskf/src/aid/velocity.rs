@@ -1,22 +1,21 @@
-//! A velocity in the world's axes: measured from outside, or a pseudo-measurement.
+//! Velocity in world or body axes: measured from outside, or a pseudo-measurement.
 //!
-//! It is the state itself: z = v, so the Jacobian is the identity in the three velocity errors.
+//! In world axes z = v, so the Jacobian is the identity in the three velocity errors. Used for
+//! camera systems, satellite receivers, the zero-velocity update (ZUPT) of a stationary vehicle,
+//! and the assumption for a vehicle without aiding.
 //!
-//! A camera system's velocity, the zero of a stationary vehicle (ZUPT), or the assumption for one that is carried
-//! out of sight of everything.
-//!
-//! | external velocity in [`Eskf`](crate::Eskf) | condition |
-//! |---|---|
-//! | start | initialised, finite, new, at most `horizon` old |
-//! | continue | the same, and a joint test ratio of the axes given of at most one |
-//! | stop | no condition of its own: inactive `aiding_timeout` after the last accepted sample |
-//! | reset | rejected for longer than `external_lockout`: velocity to the sample; its variance reset, attitude inflated |
+//! Conditions for external velocities in [`Eskf`](crate::Eskf):
+//! - **Start**: initialised, finite, new, at most `horizon` old.
+//! - **Continue**: the same, and a joint test ratio of the measured axes of at most one.
+//! - **Stop**: no further condition. Inactive `aiding_timeout` after the last accepted sample.
+//! - **Reset**: rejected for longer than `external_lockout`. The velocity is set to the sample; its
+//!   variance is reset, the attitude is inflated.
 
 use super::Row;
 use crate::filter::state::rotate_back;
 use crate::filter::{ATTITUDE, NominalState, VELOCITY};
 
-/// Predicted velocity, world, m/s: the state's own.
+/// Predicted velocity, world, m/s: that of the state.
 #[inline]
 #[must_use]
 pub fn world(state: &NominalState) -> [Row; 3] {
@@ -24,10 +23,10 @@ pub fn world(state: &NominalState) -> [Row; 3] {
     [axis(0), axis(1), axis(2)]
 }
 
-/// Predicted velocity in the body, m/s: what wheels measure along x, and what neither a wheel
-/// nor a plane has along y. For [`Eskf::fuse`](crate::Eskf::fuse).
+/// Predicted velocity in body axes, m/s, for [`Eskf::fuse`](crate::Eskf::fuse): wheels measure it
+/// along x; wheels and planes have none along y.
 ///
-/// v_b = Rᵀ·v; a small rotation θ of the body gives v_b + \[v_b\]×·θ.
+/// v_b = Rᵀ·v; a small body rotation θ gives v_b + \[v_b\]×·θ.
 #[inline]
 #[must_use]
 pub fn body(state: &NominalState) -> [Row; 3] {

@@ -1,34 +1,37 @@
-//! The gyro's bias, at rest and in motion: a Kalman filter of three states.
+//! Gyro bias at rest and in motion: a three-state Kalman filter.
 //!
-//! At rest the gyro shows it. In motion gravity does: the attitude drifts with the bias, the filtered specific force
-//! leans over with the attitude, and the rate at which it leans is what the bias does to the two level axes,
-//! low-passed. With R the rotation into the level frame and LP the filter of the specific force:
+//! At rest the gyro measures its bias. In motion gravity does: the attitude drifts with the bias,
+//! the filtered specific force tilts with the attitude, and the rate of that tilt is the low-passed
+//! effect of the bias on the two level axes. With R the rotation into the level frame and LP the
+//! filter of the specific force:
 //!
-//! > rate of leaning = LP(R·(b − b̂)), so LP(R)·b = rate of leaning + LP(R·b̂)
+//! > tilt rate = LP(R·(b − b̂)), so LP(R)·b = tilt rate + LP(R·b̂)
 //!
-//! Of the vertical axis gravity says nothing. There the bias is drawn, very gently, to where the calibration had it;
-//! the vertical axis is also what a clean magnetic field keeps turning the heading back by (`update_vertical`).
+//! Gravity has no information about the vertical axis. There a weak update pulls the bias to its
+//! calibrated value, and in a clean magnetic field the heading corrections measure it
+//! (`update_vertical`).
 //!
-//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.3; the leaning rate is taken from the filter's own
-//! derivative instead of the corrections of single samples, which in `f32` would be mostly rounding.
+//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.3. The tilt rate is the
+//! filter's own derivative instead of the corrections of single samples, which in `f32` would be
+//! mostly rounding error.
 
 use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
 use nalgebra::{Matrix3, SVector, Vector3};
 use stampfly_types::Vec3;
 
-/// Share of the weight of a level axis that the pull on the vertical one has.
+/// Weight of the pull on the vertical axis, relative to that of a level axis.
 const VERTICAL_WEIGHT: f32 = 1e-4;
 
-/// The heading's drift updates the bias when it comes from clean fields by more than this share.
+/// Smallest share of clean fields in the averaged heading corrections for an update of the bias.
 const CLEAN: f32 = 0.8;
 
-/// A bias and how well it is known, to go back to.
+/// A stored bias with its covariance, to be restored later.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct KnownBias {
     value: Vec3,
-    /// The covariance's upper triangle: row by row.
+    /// Upper triangle of the covariance, row by row.
     upper: [f32; 6],
 }
 
@@ -38,31 +41,33 @@ impl KnownBias {
         self.value
     }
 
-    /// One standard deviation of the worst axis, rad/s.
+    /// Standard deviation of the least certain axis, rad/s.
     pub fn sigma(&self) -> f32 {
         let [x, _, _, y, _, z] = self.upper;
         stampfly_types::math::sqrt(x.max(y).max(z))
     }
 }
 
-/// Estimates the gyro's bias.
+/// Estimator of the gyro bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct GyroBias {
     value: Vec3,
     calibrated: Vec3,
     covariance: Matrix3<f32>,
-    /// Rotation into the level frame in row order, then the level part of the rotated bias.
+    /// Rotation into the level frame in row order, then the level part of the rotated bias;
+    /// low-passed.
     rotated: LowPass<11>,
-    /// Vertical row of that rotation and vertical part of the bias, averaged as the heading correction averages.
+    /// Vertical row of that rotation and vertical part of the bias, averaged like the heading
+    /// correction.
     vertical: Vec3,
     vertical_bias: f32,
-    /// Share of that average that was corrected by clean fields.
+    /// Share of that average that comes from clean fields.
     clean: f32,
 }
 
 impl GyroBias {
-    /// Starts from a calibration: its bias, and how well it is known, rad/s.
+    /// Starts from a calibrated bias and its standard deviation, rad/s.
     pub fn new(config: &AttitudeConfig, calibrated: Vec3, sigma: f32) -> Self {
         Self {
             value: calibrated,
@@ -80,41 +85,41 @@ impl GyroBias {
         self.value
     }
 
-    /// What is known now.
+    /// The present bias and covariance.
     pub fn known(&self) -> KnownBias {
         let [[xx, _, _], [xy, yy, _], [xz, yz, zz]] = self.covariance.data.0;
         KnownBias { value: self.value, upper: [xx, xy, xz, yy, yz, zz] }
     }
 
-    /// Goes back to what was known.
+    /// Restores a stored bias and covariance.
     pub fn restore(&mut self, known: &KnownBias) {
         let [xx, xy, xz, yy, yz, zz] = known.upper;
         self.value = known.value;
         self.covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     }
 
-    /// What the start knew, body, rad/s.
+    /// The calibrated bias, body, rad/s.
     pub fn calibrated(&self) -> &Vec3 {
         &self.calibrated
     }
 
-    /// One standard deviation of the worst axis, rad/s.
+    /// Standard deviation of the least certain axis, rad/s.
     pub fn sigma(&self) -> f32 {
         stampfly_types::math::sqrt(self.covariance.diagonal().max())
     }
 
-    /// One standard deviation along an axis of the body, rad/s.
+    /// Standard deviation along a body axis of unit length, rad/s.
     pub fn sigma_along(&self, axis: &Vec3) -> f32 {
         stampfly_types::math::sqrt(axis.dot(&(self.covariance * *axis)))
     }
 
-    /// Propagates the variance by the bias' random walk. Also keeps what [`update_moving`](Self::update_moving) needs,
-    /// at rest as well.
+    /// Propagates the variance by the random walk. Also updates the low-pass for
+    /// [`update_moving`](Self::update_moving), so call it at rest, too.
     pub fn predict(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, dt: f32) {
         let limit = config.initial_bias_sigma * config.initial_bias_sigma;
         for axis in 0..3 {
             if let Some(variance) = self.covariance.get_mut((axis, axis)) {
-                // A variance that the calibration left above the limit stays; it does not grow.
+                // A variance that starts above the limit stays, but does not grow.
                 *variance = (*variance + config.bias_walk * config.bias_walk * dt).min(limit.max(*variance));
             }
         }
@@ -132,7 +137,8 @@ impl GyroBias {
         }
     }
 
-    /// Update in motion: the filtered specific force leans over at these rates about the level frame's x and y.
+    /// Update in motion. `leaning` are the tilt rates of the filtered specific force about level x
+    /// and y, rad/s.
     pub fn update_moving(&mut self, config: &AttitudeConfig, leaning: [f32; 2], dt: f32) {
         if !self.rotated.is_settled() {
             return;
@@ -146,9 +152,9 @@ impl GyroBias {
         self.update(config, &vertical, vertical.dot(&self.calibrated), noise / VERTICAL_WEIGHT);
     }
 
-    /// Update of the vertical axis in motion: a clean field turned the heading by `share` of a disagreement of `off`
-    /// rad. A heading that keeps being turned the same way drifts: to the averaging of the correction this is what
-    /// leaning is to that of the force.
+    /// Update of the vertical axis in motion: a clean field corrected the heading by `share` of a
+    /// disagreement of `off` rad. Repeated corrections of one sign measure the drift of the
+    /// heading, as the tilt rate does for the level axes.
     pub fn update_vertical(&mut self, config: &AttitudeConfig, vertical: &Vec3, share: f32, off: f32, dt: f32) {
         self.vertical += (vertical - self.vertical) * share;
         self.vertical_bias += (vertical.dot(&self.value) - self.vertical_bias) * share;
@@ -160,17 +166,18 @@ impl GyroBias {
         }
     }
 
-    /// The heading was not corrected, or by something else than its drift.
+    /// Reduces the weight of past corrections by `share`, after a correction that was not due to
+    /// drift.
     pub fn interrupt(&mut self, share: f32) {
         self.clean -= self.clean * share.clamp(0.0, 1.0);
     }
 
-    /// The scalar measurement `row · bias = measured`.
+    /// Scalar measurement `row · bias = measured`.
     fn update(&mut self, config: &AttitudeConfig, row: &Vec3, measured: f32, noise: f32) {
         let row = Vector3::from(*row);
         let spread = self.covariance * row;
         let gain = spread / (row.dot(&spread) + noise);
-        // Not `clamp`, which panics when a configured limit is negative or no number.
+        // Not `clamp`, which panics if a configured limit is negative or NaN.
         let limited = |part: f32| part.max(-config.bias_limit).min(config.bias_limit);
         self.value += Vec3::from(gain * limited(measured - row.dot(&self.value.into())));
         self.covariance -= gain * spread.transpose();
@@ -179,7 +186,7 @@ impl GyroBias {
     }
 }
 
-/// Variance of a measurement such that the filter settles at `sigma`, whatever the sampling rate.
+/// Measurement variance with which the filter settles at `sigma`, for any sampling rate.
 fn noise(config: &AttitudeConfig, sigma: f32, dt: f32) -> f32 {
     let variance = sigma * sigma;
     variance * variance / (config.bias_walk * config.bias_walk * dt) + variance

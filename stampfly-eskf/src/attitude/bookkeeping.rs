@@ -1,9 +1,10 @@
-//! What an [`Estimator`](crate::Estimator) has to answer for and the attitude filter does not need: time, and a record.
+//! State that the [`Estimator`](crate::Estimator) interface requires of the attitude filter: time,
+//! calibration, commands and status.
 
 use stampfly_types::Instant;
 use stampfly_types::messages::{CalibrationResult, EstimatorCommand, EstimatorStatus};
 
-/// What the trait needs and the filter does not: time, and a record.
+/// State for the trait that the filter itself does not use.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Bookkeeping {

@@ -1,87 +1,96 @@
-//! What the attitude filter can be told, and why the defaults are what they are.
+//! Configuration of the attitude filter, with the reason for each default.
 
 /// Configuration of the [`AttitudeFilter`](super::AttitudeFilter).
 ///
-/// The defaults suit a consumer-grade sensor on anything that moves by hand, by wheel or by rotor. Nothing here needs
-/// tuning to a motion; the two delays are properties of the sensors and worth measuring.
+/// The defaults suit a consumer-grade sensor on a body moved by hand, wheels or rotors. No value
+/// depends on the kind of motion. The two delays are properties of the sensors and worth measuring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttitudeConfig {
-    /// Time over which specific force is averaged, s. Longer than a hand accelerates one way, shorter than the gyro
-    /// needs to drift by a degree.
+    /// Time constant of the specific force filter, s. Longer than a hand accelerates in one
+    /// direction, shorter than the gyro takes to drift by a degree.
     pub accel_time: f32,
-    /// By how much an inertial sample is older than its stamp says, s. The low-pass inside the sensor delays it: look
-    /// up the group delay. The attitude is given for the stamp, by turning on at the current rate.
+    /// Delay of an inertial sample before its stamp, s: the group delay of the sensor's low-pass.
+    /// The attitude is extrapolated to the stamp with the current rate.
     pub inertial_delay: f32,
-    /// The same of a magnetometer sample, s: conversion time and averaging.
+    /// Delay of a magnetometer sample before its stamp, s: conversion time and averaging.
     pub mag_delay: f32,
-    /// How well `mag_delay` is known, s: the rest is estimated from what the field does in fast turns. Zero: it is known.
+    /// Standard deviation of `mag_delay`, s. The remaining delay is estimated from the field in
+    /// fast turns. Zero: known.
     pub mag_delay_sigma: f32,
 
-    /// Standard deviation of the gyro's bias without a calibration, rad/s. Half a degree a second: what sensors have
-    /// after they have been calibrated once, some day, at some temperature.
+    /// Standard deviation of the gyro bias without a calibration, rad/s. Half a degree per second:
+    /// typical of sensors calibrated once, at another time and temperature.
     pub initial_bias_sigma: f32,
-    /// Random walk of the bias, rad/s/√s. A fifth of a degree a second in a hundred seconds: warming up.
+    /// Random walk of the bias, rad/s/√s: 0.2°/s in 100 s, as during warm-up.
     pub bias_walk: f32,
-    /// Standard deviation of the bias after long motion, rad/s; sets the weight of the leaning of gravity.
+    /// Standard deviation of the bias after long motion, rad/s. Sets the weight of the drift of
+    /// gravity.
     pub motion_bias_sigma: f32,
-    /// Standard deviation of the bias after a long time at rest, rad/s; also the one that a complete calibration
-    /// leaves.
+    /// Standard deviation of the bias after a long rest, rad/s; also after a complete calibration.
     pub rest_bias_sigma: f32,
-    /// Farthest from the calibration that the bias may go, rad/s. Two degrees a second: beyond it lies slow motion, not
-    /// bias.
+    /// Largest difference of the bias from the calibration, rad/s. Two degrees per second: more is
+    /// slow motion, not bias.
     pub bias_limit: f32,
 
-    /// Low-pass of the rest detector, s.
+    /// Time constant of the stationary detector, s.
     pub rest_filter_time: f32,
-    /// Rest has to last this long, s. Shorter, and every pause of a hand is rest.
+    /// Time for which the body must be quiet to count as stationary, s. With less, every pause of a
+    /// hand is a rest.
     pub rest_time: f32,
-    /// Largest deviation of the gyro from its mean at rest, rad/s: noise of consumer sensors, times ten.
+    /// Largest deviation of the gyro from its mean at rest, rad/s: ten times the noise of consumer
+    /// sensors.
     pub rest_rate: f32,
-    /// Largest deviation of the specific force from its mean at rest, m/s²: the same.
+    /// Largest deviation of the specific force from its mean at rest, m/s²; chosen in the same way.
     pub rest_force: f32,
 
-    /// Largest deviation of strength from the reference field, as a share of it.
+    /// Largest deviation of the strength from the reference field, as a share of it.
     pub mag_strength_tolerance: f32,
-    /// Largest deviation of dip from the reference field, rad.
+    /// Largest deviation of the dip from the reference field, rad.
     pub mag_dip_tolerance: f32,
-    /// Time constant with which the reference field follows, s: cities and floors differ, rooms hardly.
+    /// Time constant with which the reference field follows, s. The field differs between cities
+    /// and floors, hardly within a room.
     pub mag_reference_time: f32,
-    /// After a disturbance the field must agree again for this long, s.
+    /// Time for which the field must agree again after a disturbance, s.
     pub mag_agree_time: f32,
-    /// A different field that stays the same for so long, while the body turns, is the new reference, s. Turning is
-    /// asked for because a body that lies beside a magnet sees a constant field too.
+    /// Time for which a different field must stay constant, while the body turns, to become the new
+    /// reference, s. Turning is required because a body at rest next to a magnet sees a constant
+    /// field, too.
     pub mag_renew_time: f32,
-    /// Without any reference, a field that stays the same for so long while the body turns, or while it turns slowly by a whole
-    /// circle in sum, is it, s.
+    /// The same without any reference, s. Alternatively the body has turned slowly by a whole
+    /// circle in sum.
     pub mag_first_time: f32,
-    /// The body turns, for the two above, at more than this, rad/s.
+    /// Angular rate above which the body counts as turning for the two times above, rad/s.
     pub mag_renew_rate: f32,
-    /// Bend of a clean field, rad: how far furniture and concrete turn it.
+    /// Direction error of a clean field, rad, from furniture and concrete.
     pub mag_sigma: f32,
-    /// Bend of the field where the filter starts, rad: it has only been seen there, on a desk with steel feet.
+    /// Direction error of the field where the filter starts, rad: observed in one place only,
+    /// possibly on a desk with steel legs.
     pub mag_start_sigma: f32,
-    /// Bend of a disturbed field, rad: little is known, so only an even less known heading follows it.
+    /// Direction error of a disturbed field, rad. Large, so that only a very uncertain heading
+    /// follows it.
     pub mag_disturbed_sigma: f32,
-    /// Direction of the field in a new place, rad, where it is as different as it takes to be a new reference.
+    /// Direction difference of the field in a new place, rad, given that it differs enough to
+    /// become a new reference.
     pub mag_place_sigma: f32,
-    /// Standard deviation of the vertical gyro bias after long motion in a clean field, rad/s; sets how much of a
-    /// drifting heading is taken for bias.
+    /// Standard deviation of the vertical gyro bias after long motion in a clean field, rad/s. Sets
+    /// how much of a drifting heading is attributed to the bias.
     pub mag_bias_sigma: f32,
 
-    /// Estimate magnetised parts that turn with the sensor, and take their field out.
+    /// Estimate the field of magnetised parts that turn with the sensor, and subtract it.
     pub hard_iron: bool,
-    /// Standard deviation of their field at the start, µT.
+    /// Initial standard deviation of that field, µT.
     pub hard_iron_sigma: f32,
-    /// Random walk of their field, µT/√s: a motor's current, a phone put on top.
+    /// Random walk of that field, µT/√s: the current of a motor, a phone put on top.
     pub hard_iron_walk: f32,
-    /// Unevenness of the world's field where the body moves, µT. Furniture and concrete: one to two.
+    /// Spatial variation of the world's field along the path of the body, µT. Furniture and
+    /// concrete: one to two.
     pub field_sigma: f32,
-    /// For how long that unevenness stays the same, s: about as long as a stroke of a hand.
+    /// Correlation time of that variation, s: about the duration of one movement of a hand.
     pub field_time: f32,
-    /// Random walk of the world's field, µT/√s: walking through a building.
+    /// Random walk of the world's field, µT/√s, as when walking through a building.
     pub field_walk: f32,
-    /// An offset below this, µT, is not told from an uneven field and not taken out.
+    /// Smallest offset that is distinguished from field variation and subtracted, µT.
     pub hard_iron_least: f32,
 }
 

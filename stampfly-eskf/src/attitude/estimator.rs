@@ -1,7 +1,8 @@
-//! The attitude filter as an [`Estimator`]: steps from time stamps, and validity of each output.
+//! The attitude filter as an [`Estimator`]: steps from time stamps, validity of each output.
 //!
-//! It has no position, no velocity and no height, says so in every estimate, and answers the sensors for them with
-//! [`Refusal::NotUsed`]. For a vehicle that must fly on something, when everything else is gone.
+//! Position, velocity and height are never valid, and their sensors are refused with
+//! [`Refusal::NotUsed`]. Use it as the fallback of a vehicle after the loss of all other
+//! estimators.
 
 use super::bookkeeping::Bookkeeping;
 use super::filter::AttitudeFilter;
@@ -12,15 +13,15 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, Instant, Vec3, math};
 
-/// Place of the magnetometer in the counters of the status.
+/// Index of the magnetometer in the counters of the status.
 const MAG: usize = 3;
-/// Period of a magnetometer whose first sample this is, s.
+/// Assumed period before the first magnetometer sample, s.
 const FIRST_PERIOD: f32 = 0.01;
-/// A field from farther in the future has a wrong stamp.
+/// A field stamped farther ahead than this is refused.
 const FUTURE: Duration = Duration::from_millis(100);
-/// A sensor took part if it did within this time.
+/// Time after its last use for which the magnetometer counts as active.
 const RECENT: Duration = Duration::from_secs(1);
-/// A heading that is known worse than this, rad, is not.
+/// Largest standard deviation of a valid heading, rad.
 const HEADING_SIGMA: f32 = 0.35;
 
 impl Estimator for AttitudeFilter {
@@ -34,7 +35,8 @@ impl Estimator for AttitudeFilter {
             Bookkeeping { now: at, initialized: true, calibration: *calibration, command, ..Default::default() };
     }
 
-    /// Only a full reset concerns an attitude: standing still is seen, and there is no position to be set.
+    /// Only a full reset is obeyed: rest is detected by the filter itself, and there is no position
+    /// to reset.
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.book.command, *command);
         if command.full_resets != previous.full_resets && self.book.initialized {
@@ -74,7 +76,7 @@ impl Estimator for AttitudeFilter {
         if at > book.now + FUTURE {
             return Fusion::Refused(Refusal::Future);
         }
-        // A field that is newer than the last inertial sample is taken for as new.
+        // A field ahead of the last inertial sample counts as having its time.
         let age = if at < book.now { book.now.since(at).seconds() } else { 0.0 };
         let dt = book.mag_at.map_or(FIRST_PERIOD, |last| at.since(last).seconds());
         let fusion = self.field(&mag.field, age, dt);
@@ -108,7 +110,7 @@ impl Estimator for AttitudeFilter {
     fn estimate(&self) -> StateEstimate {
         let book = &self.book;
         let recent = book.mag_fused.is_some_and(|at| book.now.since(at) < RECENT);
-        // Without any magnetometer the heading is relative to the start, and as good as the gyro.
+        // Without a magnetometer the heading is relative to the start and as good as the gyro.
         let heading = book.mag_at.is_none() || self.heading_sigma() < HEADING_SIGMA;
         StateEstimate {
             attitude: self.attitude(),

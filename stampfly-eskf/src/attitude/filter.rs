@@ -1,22 +1,25 @@
-//! The attitude filter: gyro, accelerometer and magnetometer in, attitude out.
+//! Attitude filter for gyro, accelerometer and optional magnetometer.
 //!
-//! Use it for a body without a position sensor: a handheld device, a head tracker, a rover's or a glider's attitude,
-//! the fallback of a flying vehicle. Three rotations in a row, each from the sensor that knows it:
+//! Use it for a body without a position sensor: a handheld device, a head tracker, a rover or
+//! glider, or as the fallback of a flying vehicle. Not for a vehicle with measured velocity: the
+//! [`Eskf`](crate::Eskf) can separate acceleration from gravity.
 //!
-//! | rotation | from | changes |
+//! The attitude is the product of three rotations, each from one sensor:
+//!
+//! | rotation | source | changes |
 //! |---|---|---|
 //! | body → drifting | gyro without bias | with every sample |
-//! | drifting → level | specific force, low-passed in the drifting frame, where turning does not move it | slowly |
-//! | level → world | magnetic field without hard iron, if it is the earth's | slowly, about the vertical only |
+//! | drifting → level | specific force, low-passed in the drifting frame | slowly |
+//! | level → world | magnetic field without hard iron, if undisturbed | slowly, vertical axis only |
 //!
-//! Tilt therefore owes nothing to the magnetometer but a little gyro bias, and acceleration is averaged over seconds
-//! however fast the body turns. Not for a vehicle whose velocity is measured: the [`Eskf`](crate::Eskf) knows which
-//! acceleration is motion.
+//! The drifting frame hardly rotates, so acceleration is averaged over seconds however fast the
+//! body turns. The magnetometer affects the tilt only through the gyro bias.
 //!
-//! Structure after Laidig, Seel, "VQF: Highly accurate IMU orientation estimation with bias estimation and magnetic
-//! disturbance rejection", Information Fusion 91, 2023. Different here: sensor delays, hard iron estimated in motion, a
-//! heading gain from what is known of gyro and field, the vertical gyro bias from the field, the way back from another
-//! place, forms that are sound in `f32`, steps of any length.
+//! Structure after Laidig, Seel, "VQF: Highly accurate IMU orientation estimation with bias
+//! estimation and magnetic disturbance rejection", Information Fusion 91, 2023. Different here:
+//! sensor delays, hard iron estimated in motion, a heading gain from the uncertainties of gyro and
+//! field, the vertical gyro bias from the field, the return from another place, formulas that are
+//! accurate in `f32`, steps of any length.
 
 mod field;
 
@@ -36,25 +39,26 @@ use nalgebra::Matrix3;
 use stampfly_types::messages::CalibrationResult;
 use stampfly_types::{Quat, Vec3, frame};
 
-/// No sensor measures more: rad/s, m/s², µT. Beyond, a sample is an error of transmission.
+/// Largest plausible samples: rad/s, m/s², µT. Larger ones are transmission errors.
 const LARGEST_RATE: f32 = 200.0;
 const LARGEST_FORCE: f32 = 2_000.0;
 const LARGEST_FIELD: f32 = 10_000.0;
-/// No sensor's bias is larger, rad/s: such a calibration was made in motion.
+/// Largest plausible gyro bias, rad/s. A calibration with more was made in motion.
 const LARGEST_BIAS: f32 = 0.5;
-/// A longer step is taken for this, s: what happened meanwhile is not known anyway.
+/// Longest step that is integrated, s. Longer ones are shortened to it.
 const LONGEST_STEP: f32 = 0.5;
-/// Standard deviation of a heading that was defined while the body moved, rad.
+/// Standard deviation of a heading that was defined in motion, rad.
 const MOVING_START_SIGMA: f32 = 1.0;
 
-/// Attitude from gyro, accelerometer and, if there is one, magnetometer.
+/// Attitude from gyro, accelerometer and, if present, magnetometer. See [`step`](Self::step) for
+/// the units and [`Estimator`](crate::Estimator) for use with time stamps.
 ///
 /// ```
 /// use stampfly_eskf::attitude::{AttitudeConfig, AttitudeFilter};
 /// use stampfly_types::{Vec3, frame};
 ///
 /// let mut filter = AttitudeFilter::new(AttitudeConfig::default());
-/// // Level and still; the field points north-west and down.
+/// // Level and still; the field points 45° to the right of the nose, and down.
 /// for _ in 0..100 {
 ///     filter.step(&Vec3::new(0.0, 0.0, -9.81), &Vec3::zeros(), 0.01);
 ///     filter.field(&Vec3::new(15.0, 15.0, 40.0), 0.0, 0.01);
@@ -71,7 +75,7 @@ pub struct AttitudeFilter {
     strapdown: Quat,
     /// Drifting → level.
     level: Quat,
-    /// Specific force in the drifting frame.
+    /// Specific force in the drifting frame, low-passed.
     force: LowPass<3>,
     bias: GyroBias,
     stationary: StationaryDetector,
@@ -80,7 +84,7 @@ pub struct AttitudeFilter {
     heading: Heading,
     hard_iron: HardIron,
     mag_delay: MagDelay,
-    /// Hard iron that samples are freed of.
+    /// Hard iron subtracted from samples, body, µT.
     offset: Vec3,
     rate: Vec3,
     accel: Vec3,
@@ -89,8 +93,8 @@ pub struct AttitudeFilter {
 }
 
 impl AttitudeFilter {
-    /// A filter that takes its first samples for the start: tilt from the first specific force, heading from the first
-    /// field.
+    /// A filter that starts with its first samples: tilt from the first specific force, heading
+    /// from the first field.
     #[must_use]
     pub fn new(config: AttitudeConfig) -> Self {
         Self {
@@ -113,9 +117,9 @@ impl AttitudeFilter {
         }
     }
 
-    /// A filter that starts from a still-calibration, at heading zero: the calibration's field then points where it
-    /// should. A calibration with numbers that are not finite, or beyond any
-    /// sensor, is ignored.
+    /// A filter that starts from a still calibration with heading zero; the field of the
+    /// calibration becomes the reference. A calibration with values that are not finite or beyond
+    /// any sensor is ignored.
     #[must_use]
     pub fn from_calibration(config: AttitudeConfig, calibration: &CalibrationResult) -> Self {
         let mut filter = Self::new(config);
@@ -142,10 +146,11 @@ impl AttitudeFilter {
         filter
     }
 
-    /// Takes the specific force, m/s², and rate, rad/s, both body FRD, and the time since the last step, s.
+    /// Takes the specific force, m/s², and the rate, rad/s, both body FRD, and the time since the
+    /// last step, s.
     ///
-    /// Samples that are not finite or beyond any sensor, and times that are not above zero, change nothing. More than
-    /// half a second is taken for half a second.
+    /// Samples that are not finite or beyond any sensor, and times that are not positive, are
+    /// ignored. Times above half a second count as half a second.
     pub fn step(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) {
         if dt.is_nan() || dt <= 0.0 || !within(gyro, LARGEST_RATE) || !within(accel, LARGEST_FORCE) {
             return;
@@ -160,7 +165,8 @@ impl AttitudeFilter {
         let half = from_vector(&(self.rate * (0.5 * dt)));
         let middle = product(&self.strapdown, &half);
         self.strapdown = product(&middle, &half);
-        // Rate and force are both means over the step, or samples at the same instant: the force belongs to the middle.
+        // Rate and force are means over the step, or samples at one instant: the force belongs to
+        // the middle.
         self.force.step(&(middle * accel).into(), dt);
         if let Some(correction) = upwards(&(self.level * Vec3::from(*self.force.value()))) {
             self.level = product(&correction, &self.level);
@@ -186,13 +192,14 @@ impl AttitudeFilter {
         }
     }
 
-    /// Body FRD → world NED, at the stamp of the last step. North is magnetic north, or where the calibration was.
+    /// Body FRD → world NED, at the stamp of the last step. North is magnetic north, or the nose at
+    /// the calibration.
     #[must_use]
     pub fn attitude(&self) -> Quat {
         product(&frame::from_yaw(self.heading.value()), &self.attitude_without_field())
     }
 
-    /// The same without any magnetometer: the heading drifts, the tilt is the same.
+    /// The same without the magnetometer: same tilt, drifting heading.
     #[must_use]
     pub fn attitude_without_field(&self) -> Quat {
         let ahead = from_vector(&(self.rate * self.config.inertial_delay));
@@ -211,37 +218,39 @@ impl AttitudeFilter {
         self.bias.value()
     }
 
-    /// One standard deviation of the gyro bias, worst axis, rad/s.
+    /// Standard deviation of the gyro bias, least certain axis, rad/s.
     #[must_use]
     pub fn gyro_bias_sigma(&self) -> f32 {
         self.bias.sigma()
     }
 
-    /// Field of magnetised parts that turn with the sensor, body, µT; zero while it is not told from chance.
+    /// Field of magnetised parts that turn with the sensor, body, µT. Zero while it is not
+    /// significant.
     #[must_use]
     pub fn hard_iron(&self) -> Vec3 {
         self.offset
     }
 
-    /// By how much the magnetometer's samples are older than their stamps, s, as far as it is known.
+    /// Delay of the magnetometer's samples before their stamps, s: configured plus estimated.
     #[must_use]
     pub fn mag_delay(&self) -> f32 {
         self.config.mag_delay + self.mag_delay.value(&self.config)
     }
 
-    /// Is the body at rest?
+    /// Whether the body is at rest.
     #[must_use]
     pub fn is_stationary(&self) -> bool {
         self.stationary.is_stationary(&self.config)
     }
 
-    /// One standard deviation of the heading against magnetic north, rad. Above one it is not known.
+    /// Standard deviation of the heading relative to magnetic north, rad. Above one, the heading is
+    /// unknown.
     #[must_use]
     pub fn heading_sigma(&self) -> f32 {
         self.heading.sigma()
     }
 
-    /// By how much the last field disagreed with the heading, rad.
+    /// Difference of the last field's heading from the estimated one, rad.
     #[must_use]
     pub fn heading_innovation(&self) -> f32 {
         self.heading.innovation()

@@ -1,17 +1,18 @@
-//! Magnetised parts that turn with the sensor: their field, told from the world's by turning.
+//! Hard iron estimated in motion: the field of magnetised parts that turn with the sensor.
 //!
-//! A screw, a speaker, a battery current add a constant to the measured field in the *body*; the earth's field is
-//! constant in the *world*. With the rotation R into the level frame, which gyro and gravity give without any
-//! magnetometer, a sample in that frame is
+//! A screw, a speaker or a battery current adds a constant to the field in the *body*; the earth's
+//! field is constant in the *world*. With the rotation R into the level frame, known from gyro and
+//! gravity without a magnetometer, a sample in that frame is
 //!
-//! > R·measured = field + R·offset + unevenness
+//! > R·measured = field + R·offset + variation
 //!
-//! linear in both unknowns: a Kalman filter of six states. Body at rest: only the sum is known, and the covariance
-//! says so. What drifts in heading is followed as a random walk of the field. The world's field is uneven indoors, and
-//! its unevenness stays the same for about a second, so samples count as if there were one a second.
+//! which is linear in both unknowns: a Kalman filter of six states. For a body at rest only the sum
+//! is observable, which the covariance represents. Heading drift appears as a random walk of the
+//! field. Indoors the world's field varies in space, and the variation is correlated over about a
+//! second, so the samples of a second together count as one.
 //!
-//! Not for a soft-iron (ellipsoid) calibration, and not for telling a magnet in the hand from one on the table while
-//! nothing turns.
+//! Not for soft iron (see [`EllipsoidFit`](crate::calibration::EllipsoidFit)), and unable to
+//! distinguish a magnet on the sensor from one next to it while nothing turns.
 
 use super::config::AttitudeConfig;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -19,11 +20,12 @@ use stampfly_types::Vec3;
 
 /// Squared distance, in variances, beyond which a component of a sample is an outlier.
 const GATE: f32 = 16.0;
-/// Outliers for so long, s, and the variance is inflated until they are none.
+/// Time of consecutive outliers after which the random walks are enlarged, s.
 const LOCKOUT: f32 = 3.0;
-/// Over how long the strength of the field is watched, s.
+/// Averaging time of the strength statistics, s.
 const WATCH: f32 = 15.0;
-/// An offset is used when it takes out so much of the strength's variance, and no longer when it leaves so much.
+/// The offset is used once it reduces the variance of the strength to this share, and dropped above
+/// the second one.
 const USED_BELOW: f32 = 0.5;
 const DROPPED_ABOVE: f32 = 0.8;
 
@@ -43,18 +45,18 @@ impl Spread {
     }
 }
 
-/// Estimates the offset.
+/// Estimator of the offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct HardIron {
-    /// World's field in the level frame, then offset in the body, µT.
+    /// World field in the level frame, then offset in the body, µT.
     state: SVector<f32, 6>,
     covariance: SMatrix<f32, 6, 6>,
     outliers_for: f32,
     started: bool,
-    /// Time watched so far, s.
+    /// Time of statistics so far, s.
     watched: f32,
-    /// Strength of the field as it is, and without the offset.
+    /// Strength of the field as measured, and without the offset.
     strength: [Spread; 2],
     used: bool,
 }
@@ -74,7 +76,7 @@ impl HardIron {
         }
     }
 
-    /// The offset to take out of samples, body, µT: the estimate, shortened by what may be chance.
+    /// Offset to subtract from samples, body, µT: the estimate, shortened by its uncertainty.
     pub fn offset(&self, config: &AttitudeConfig) -> Vec3 {
         if !self.used {
             return Vec3::zeros();
@@ -82,7 +84,8 @@ impl HardIron {
         let offset = self.iron();
         let variance = self.covariance.diagonal().fixed_rows::<3>(3).sum();
         let chance = config.hard_iron_least * config.hard_iron_least + variance;
-        // James and Stein's estimator, positive part: zero while the offset is no longer than its own deviation.
+        // Positive-part James-Stein estimator: zero while the offset is not longer than its
+        // standard deviation.
         offset * (1.0 - chance / offset.norm_squared().max(1e-6)).max(0.0)
     }
 
@@ -91,12 +94,13 @@ impl HardIron {
         self.state.fixed_rows::<3>(0).into_owned().into()
     }
 
-    /// The offset as estimated, body, µT.
+    /// The estimated offset, body, µT.
     fn iron(&self) -> Vec3 {
         self.state.fixed_rows::<3>(3).into_owned().into()
     }
 
-    /// Does the offset explain why the strength changes? Only looked at while the body turns.
+    /// Tests whether the offset explains the changes of the strength. Call it only while the body
+    /// turns.
     fn watch(&mut self, field: &Vec3, dt: f32) {
         self.watched = (self.watched + dt).min(WATCH);
         let share = (dt / self.watched).min(1.0);
@@ -109,7 +113,8 @@ impl HardIron {
         self.used = self.watched > 0.2 * WATCH && without < limit * raw;
     }
 
-    /// Takes a field, body, µT, `dt` seconds after the one before, with the rotation into the level frame.
+    /// Takes a field, body, µT, `dt` seconds after the last one, with the rotation into the level
+    /// frame.
     pub fn step(&mut self, config: &AttitudeConfig, level: &Matrix3<f32>, field: &Vec3, turning: bool, dt: f32) {
         let turned = level * Vector3::from(*field);
         if turning {
@@ -120,6 +125,7 @@ impl HardIron {
             self.state.fixed_rows_mut::<3>(0).copy_from(&turned);
         }
         let walk = |sigma: f32| sigma * sigma * dt;
+        // After a lock-out the walks grow, until a moved magnet passes the outlier test again.
         let patience = if self.outliers_for > LOCKOUT { 400.0 } else { 1.0 };
         let walks = [walk(config.field_walk), walk(config.hard_iron_walk)].map(|walk| walk * patience);
         for state in 0..6 {
@@ -147,6 +153,7 @@ impl HardIron {
             return;
         }
         self.outliers_for = 0.0;
+        // Correlated samples: weigh them as one per `field_time`.
         let noise = single * (config.field_time / dt).max(1.0);
         for (row, measured) in rows.iter().zip(turned.iter()) {
             let spread = self.covariance * row;
@@ -165,7 +172,7 @@ mod tests {
     const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
     const DT: f32 = 0.01;
 
-    /// So many seconds in a field with this offset, turning about all axes by ±`swing` rad or not at all.
+    /// `time` seconds in a field with this offset, turning about all axes by ±`swing` rad.
     fn seconds(hard_iron: &mut HardIron, time: f32, offset: Vec3, swing: f32) {
         let config = AttitudeConfig::default();
         for step in 0..(time / DT) as u32 {

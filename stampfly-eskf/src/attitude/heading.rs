@@ -1,70 +1,70 @@
-//! Heading by the magnetic field: a Kalman filter of one state, and what a strange field may do to it.
+//! Heading from the magnetic field: a one-state Kalman filter.
 //!
-//! The gyro's heading drifts as fast as its bias is unknown; a field indoors is bent by some degrees, differently every
-//! second or two. The filter weighs the two by what is known of each, so that a calibrated gyro follows the field over
-//! most of a minute and a new one within seconds. A disturbed field counts very little, and only gets its way when the
-//! gyro has been alone for so long that it knows even less.
+//! The gyro's heading drifts with its bias uncertainty. An indoor field is distorted by some
+//! degrees, differently every second or two. The filter weighs the two by their uncertainties, so
+//! that a calibrated gyro follows the field over most of a minute and an uncalibrated one within
+//! seconds. A disturbed field has little weight and matters only after the gyro alone has become
+//! less certain than it.
 //!
-//! When another field becomes the reference, its direction disagrees with the heading by some angle. How much of
-//! that is the heading's drift and how much is the direction of the new field, follows from the two variances: the
-//! heading takes its share at once and the rest becomes the declination of the new place. When the
-//! first field is back, the declination is dropped.
+//! When another field becomes the reference, its direction disagrees with the heading. The two
+//! variances divide the disagreement: the heading takes its share at once, the rest becomes the
+//! declination of the new place. When the first field returns, the declination is dropped.
 
 use super::config::AttitudeConfig;
 use stampfly_types::{Vec3, math};
 
-/// For how long a bias stays on the same side, s: makes a random walk of it.
+/// Correlation time of the bias error, s. It makes a random walk of the heading error.
 const BIAS_TIME: f32 = 10.0;
-/// Error of the gyro's scale, as a share, and for how long a hand turns one way, s.
+/// Scale error of the gyro, as a share, and the time for which a hand turns in one direction, s.
 const SCALE_ERROR: f32 = 0.002;
 const TURN_TIME: f32 = 0.5;
-/// For how long a bend stays the same at rest, s.
+/// Correlation time of the field distortion at rest, s.
 const REST_TIME: f32 = 30.0;
-/// Largest variance, rad²: from here on any heading is as likely.
+/// Largest variance, rad²: the heading is unknown.
 const MAX_VARIANCE: f32 = 3.0;
 
 /// Heading of the level frame in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Heading {
-    /// Direction of the level part of the reference field in the world, rad.
+    /// Direction of the horizontal part of the reference field in the world, rad.
     north: f32,
-    /// By how much the reference in use points elsewhere, rad.
+    /// Direction of the present reference relative to the first one, rad.
     declination: f32,
     value: f32,
     variance: f32,
-    /// The last field's disagreement, rad.
+    /// Disagreement of the last field, rad.
     off: f32,
 }
 
 impl Heading {
-    /// Nothing is known; north is where the field points.
+    /// Unknown heading; north is where the field points.
     pub fn unknown() -> Self {
         Self { north: 0.0, declination: 0.0, value: 0.0, variance: MAX_VARIANCE, off: 0.0 }
     }
 
-    /// The heading is zero by definition, and this is the field then, in the level frame. `sigma`: how far that
-    /// field may be bent, rad.
+    /// Heading zero by definition, with this field in the level frame. `sigma` is the direction
+    /// error of the field, rad.
     pub fn defined_by(field: &Vec3, sigma: f32) -> Self {
         Self { north: math::atan2(field.y, field.x), variance: sigma * sigma, ..Self::unknown() }
     }
 
-    /// Turns the level frame into the world, rad.
+    /// Rotation from the level frame to the world about the vertical, rad.
     pub fn value(&self) -> f32 {
         self.value
     }
 
-    /// One standard deviation, rad.
+    /// Standard deviation, rad.
     pub fn sigma(&self) -> f32 {
         math::sqrt(self.variance)
     }
 
-    /// By how much the last field disagreed, rad.
+    /// Disagreement of the last field, rad.
     pub fn innovation(&self) -> f32 {
         self.off
     }
 
-    /// Propagates the variance: the gyro is wrong by a bias of this standard deviation and by its scale at this rate,
+    /// Propagates the variance with a gyro bias error of `bias_sigma` and a scale error at `rate`,
     /// rad/s.
     pub fn predict(&mut self, bias_sigma: f32, rate: f32, dt: f32) {
         let scale = SCALE_ERROR * rate;
@@ -72,17 +72,17 @@ impl Heading {
         self.variance = (self.variance + walk * dt).min(MAX_VARIANCE);
     }
 
-    /// Inflates the variance by an error of the field of this standard deviation, rad.
+    /// Adds a field error with this standard deviation, rad, to the variance.
     pub fn inflate(&mut self, sigma: f32) {
         self.variance = (self.variance + sigma * sigma).min(MAX_VARIANCE);
     }
 
-    /// The first reference is back.
+    /// The first reference is valid again.
     pub fn clear_declination(&mut self) {
         self.declination = 0.0;
     }
 
-    /// Another field, in the level frame, is the reference from now on.
+    /// Another field, in the level frame, becomes the reference.
     pub fn change_reference(&mut self, config: &AttitudeConfig, field: &Vec3) {
         self.declination = 0.0;
         let off = self.disagreement(field);
@@ -92,10 +92,10 @@ impl Heading {
         self.variance *= 1.0 - share;
     }
 
-    /// Update with a field in the level frame that may be bent by `sigma`, rad. Gives the share of the disagreement,
-    /// which is the second number, rad, that went into the heading.
+    /// Update with a field in the level frame whose direction error is `sigma`, rad. Returns the
+    /// share of the disagreement that went into the heading, and the disagreement, rad.
     ///
-    /// At rest the bend is the same in every sample: what is known does not become more.
+    /// At rest the distortion is the same in every sample, so the variance does not decrease.
     pub fn update(
         &mut self,
         config: &AttitudeConfig,
@@ -106,7 +106,8 @@ impl Heading {
     ) -> (f32, f32) {
         let off = self.disagreement(field);
         self.off = off;
-        // A field that has turned by more than the heading's deviation is bent by that.
+        // A disagreement beyond the heading's uncertainty must be distortion: enlarge its standard
+        // deviation.
         let sigma = sigma.max(off.abs() * (1.0 - self.share(config)));
         let time = if stationary { REST_TIME } else { config.field_time };
         let noise = sigma * sigma * (time / dt).max(1.0);
@@ -117,12 +118,12 @@ impl Heading {
         (share, off)
     }
 
-    /// Share of the heading in a disagreement with a field that nothing is known of.
+    /// Share of the heading in a disagreement with a field of unknown direction.
     fn share(&self, config: &AttitudeConfig) -> f32 {
         self.variance / (self.variance + config.mag_place_sigma * config.mag_place_sigma)
     }
 
-    /// By how much the field points too far to the east, rad.
+    /// Angle by which the field points too far east, rad.
     fn disagreement(&self, field: &Vec3) -> f32 {
         math::wrap_angle(math::atan2(field.y, field.x) + self.value - self.north - self.declination)
     }
@@ -136,7 +137,7 @@ mod tests {
     const DT: f32 = 0.01;
     const DEGREE: f32 = math::PI / 180.0;
 
-    /// A field that points so far to the east, in degrees.
+    /// A field that points this many degrees east of north.
     fn pointing(east: f32) -> Vec3 {
         Vec3::new(16.0 * math::cos(east * DEGREE), 16.0 * math::sin(east * DEGREE), 42.0)
     }

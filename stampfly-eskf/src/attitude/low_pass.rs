@@ -1,15 +1,17 @@
-//! A second-order low-pass for vectors, sound in `f32` at time constants of seconds and rates of kilohertz.
+//! Second-order low-pass for vectors, accurate in `f32` with time constants of seconds at kilohertz
+//! rates.
 //!
-//! Butterworth response as a state-variable filter: two integrators by the trapezoidal rule, their loop closed within
-//! the sample (Zavalishin, "The Art of VA Filter Design", chapter 4). A biquad would have to tell 1 from 1 − 10⁻⁷ in
-//! its coefficients; here they are themselves small numbers. Two more gifts: the output's derivative is one of the two
-//! states and needs no difference of nearly equal numbers, and `dt` may change from sample to sample.
+//! Butterworth response as a state-variable filter: two trapezoidal integrators with the loop
+//! closed within the sample (Zavalishin, "The Art of VA Filter Design", chapter 4). A biquad would
+//! have to represent 1 − 10⁻⁷ in its coefficients; here the coefficients themselves are small. The
+//! derivative of the output is a state, without cancellation, and `dt` may change from sample to
+//! sample.
 //!
-//! Until a time constant has passed the output is the mean of the input, so that a start needs no settling (Laidig,
-//! Seel, "VQF", Information Fusion 91, 2023, section 3.6).
+//! Until one time constant has passed, the output is the mean of the input, so the filter needs no
+//! settling (Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.6).
 //!
-//! Not for shaping control signals: there the corner is near the sampling rate and the tangent of the exact bilinear
-//! transform, left out here, matters.
+//! Not for control signals: with a corner near the sampling rate the tangent of the exact bilinear
+//! transform matters, which is omitted here.
 
 use nalgebra::SVector;
 
@@ -18,29 +20,29 @@ use nalgebra::SVector;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct LowPass<const N: usize> {
     time_constant: f32,
-    /// Time filtered so far, up to the time constant.
+    /// Time filtered so far, up to the time constant, s.
     age: f32,
-    /// Derivative of the output over the corner frequency, as the integrator holds it.
+    /// Integrator state: derivative of the output divided by the corner frequency.
     slope: SVector<f32, N>,
-    /// The output, as the integrator holds it.
+    /// Integrator state: the output.
     level: SVector<f32, N>,
     value: SVector<f32, N>,
     rate: SVector<f32, N>,
 }
 
 impl<const N: usize> LowPass<N> {
-    /// A filter that has seen nothing. Time constant in seconds, above zero.
+    /// An empty filter. The time constant is in seconds and positive.
     pub fn new(time_constant: f32) -> Self {
         let zero = SVector::zeros();
         Self { time_constant, age: 0.0, slope: zero, level: zero, value: zero, rate: zero }
     }
 
-    /// A filter that has seen this value for ever.
+    /// A filter in steady state at this value.
     pub fn settled_at(time_constant: f32, value: SVector<f32, N>) -> Self {
         Self { age: time_constant, level: value, value, ..Self::new(time_constant) }
     }
 
-    /// Takes a sample `dt` seconds after the one before.
+    /// Takes a sample `dt` seconds after the last one.
     pub fn step(&mut self, input: &SVector<f32, N>, dt: f32) {
         if self.age < self.time_constant {
             self.age += dt;
@@ -48,6 +50,7 @@ impl<const N: usize> LowPass<N> {
             self.level = self.value;
             return;
         }
+        // Before this point the loop has not run: the output was the mean.
         let corner = core::f32::consts::SQRT_2 / self.time_constant;
         let gain = 0.5 * corner * dt;
         let loop_gain = 1.0 / (1.0 + gain * (gain + core::f32::consts::SQRT_2));
@@ -69,7 +72,7 @@ impl<const N: usize> LowPass<N> {
         &self.rate
     }
 
-    /// Has it seen more than a time constant?
+    /// Whether more than a time constant has been filtered.
     pub fn is_settled(&self) -> bool {
         self.age >= self.time_constant
     }
@@ -81,7 +84,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
     use nalgebra::Vector1;
 
-    /// Two passes over the same input: `f32` here, the bilinear biquad in `f64`.
+    /// Largest difference from the bilinear biquad in `f64` on the same input.
     fn worst_difference(rate: f64, time_constant: f64) -> f64 {
         let gain = (0.5 * 2f64.sqrt() / time_constant / rate).tan();
         let scale = 1.0 / (1.0 + gain * (gain + 2f64.sqrt()));
@@ -104,7 +107,7 @@ mod tests {
     fn single_precision_is_enough_from_100_hz_to_8_khz() {
         for rate in [100.0, 400.0, 1_000.0, 8_000.0] {
             let worst = worst_difference(rate, 3.0);
-            // m/s² beside gravity: a thirtieth of a degree of tilt.
+            // In m/s², to be compared with gravity: a thirtieth of a degree of tilt.
             assert!(worst < 6e-3, "{worst} at {rate} Hz");
         }
     }

@@ -1,26 +1,28 @@
-//! Is the magnetic field the earth's? And if not: which field is it?
+//! Classifies a magnetic field: clean, disturbed, or that of another place.
 //!
-//! Two things are known of a field without knowing the heading: how strong it is and how far it dips. A sample that differs
-//! from the reference in either is disturbed. A field that differs but stays the same while the body turns, is
-//! another place, and becomes the reference; the first one is remembered, and taken again as soon as it is back.
+//! Strength and dip of a field are known without the heading. A sample that differs from the
+//! reference in either is disturbed. A different field that stays constant while the body turns
+//! belongs to another place and becomes the reference; the first reference is kept and used again
+//! as soon as it returns.
 //!
-//! What is done about a disturbed field, and about the direction of a new one, is for [`Heading`](super::heading::Heading)
-//! to say. Neither can be told from here: a field that is turned about the vertical and nothing else.
+//! [`Heading`](super::heading::Heading) decides the effect of a disturbed field and the direction
+//! of a new one. A field that is only rotated about the vertical cannot be detected here.
 //!
-//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.5. New: the way back.
+//! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.5; the return to the first
+//! reference is new.
 
 use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
 use nalgebra::Vector2;
 use stampfly_types::{Vec3, math};
 
-/// Time constant that takes the noise out of strength and dip, s.
+/// Time constant of strength and dip, s.
 const SMOOTHING: f32 = 0.05;
-/// Without any reference, a field is one that stays the same while the body turns slowly by so much in sum, rad: a whole circle, there
-/// and back. A boat of 10°/s needs about a minute.
+/// Sum of slow rotation with a constant field that suffices for a first reference, rad: one circle,
+/// there and back. A boat at 10°/s takes about a minute.
 const SLOW_TURNS: f32 = core::f32::consts::TAU;
 
-/// A field as it is known without a heading.
+/// A field without its heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Field {
@@ -29,13 +31,14 @@ struct Field {
 }
 
 impl Field {
-    /// Strength and dip of a field in the level frame; `None` where it has no level part.
+    /// Strength and dip of a field in the level frame; `None` if its horizontal part is at most 1
+    /// µT.
     fn of(field: &Vec3) -> Option<Self> {
         let level = math::sqrt(field.x * field.x + field.y * field.y);
         (level > 1.0).then(|| Self { strength: field.norm(), dip: math::atan2(field.z, level) })
     }
 
-    /// How far another field is from this one: at one it is as different as is tolerated.
+    /// Distance of another field, where one is the largest tolerated difference.
     fn distance(&self, config: &AttitudeConfig, other: &Self) -> f32 {
         let strength = (other.strength - self.strength).abs() / (config.mag_strength_tolerance * self.strength);
         strength.max((other.dip - self.dip).abs() / config.mag_dip_tolerance)
@@ -47,32 +50,32 @@ impl Field {
     }
 }
 
-/// What a field is.
+/// Classification of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FieldStatus {
-    /// It is the reference, as far as can be told.
+    /// Consistent with the reference.
     Clean {
         /// Distance from the reference, one at the limit.
         ratio: f32,
     },
-    /// It is not.
+    /// Inconsistent with the reference.
     Disturbed {
-        /// Distance from the reference, above one unless it has only just begun to agree again.
+        /// Distance from the reference, above one unless it has only just become consistent.
         ratio: f32,
     },
-    /// There is no reference yet to compare it with.
+    /// No reference yet.
     NoReference,
-    /// It has become the first reference with this sample.
+    /// With this sample it became the first reference.
     FirstReference,
-    /// Another field than before has become the reference with this sample.
+    /// With this sample it replaced the reference.
     NewReference,
-    /// The first one is the reference again.
+    /// With this sample the first reference became valid again.
     ReferenceReturned,
-    /// It has no level part to tell a heading by.
+    /// No horizontal part.
     Vertical,
 }
 
-/// Compares the field with the reference.
+/// Comparison with the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Magnetic {
@@ -84,19 +87,19 @@ pub(super) struct Magnetic {
     agrees_for: f32,
     home_agrees_for: f32,
     candidate_for: f32,
-    /// By how much the body has turned since the candidate, where it was slow, rad.
+    /// Slow rotation since the candidate was first seen, rad.
     slowly_turned: f32,
 }
 
 impl Magnetic {
-    /// Expects fields like this one in the level frame; without one, waits until a field stays the same.
+    /// Expects fields like `reference`, level frame, µT. Without one, waits for a constant field.
     pub fn new(reference: Option<&Vec3>) -> Self {
         Self {
             current: LowPass::new(SMOOTHING),
             reference: reference.and_then(Field::of),
             home: None,
             candidate: None,
-            // What it begins with need not prove itself.
+            // The initial reference is valid at once.
             agrees_for: f32::MAX,
             home_agrees_for: 0.0,
             candidate_for: 0.0,
@@ -104,7 +107,8 @@ impl Magnetic {
         }
     }
 
-    /// Takes a field in the level frame, `dt` seconds after the one before; `rate` is how fast the body turns, rad/s.
+    /// Takes a field in the level frame, µT, `dt` seconds after the last one, and the angular rate,
+    /// rad/s.
     pub fn step(&mut self, config: &AttitudeConfig, field: &Vec3, rate: f32, dt: f32) -> FieldStatus {
         let Some(measured) = Field::of(field) else { return FieldStatus::Vertical };
         self.current.step(&Vector2::new(measured.strength, measured.dip), dt);
@@ -171,7 +175,8 @@ mod tests {
     const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
     const DT: f32 = 0.01;
 
-    /// Verdicts over so many seconds of one field, the body turning at `rate`: how many were clean, and the others' kinds.
+    /// Classifications over `time` seconds of one field at `rate`: number of clean ones, and of the
+    /// other kinds.
     fn seconds(magnetic: &mut Magnetic, time: f32, field: Vec3, rate: f32) -> (u32, [u32; 4]) {
         let config = AttitudeConfig::default();
         let (mut clean, mut others) = (0, [0; 4]);

@@ -1,14 +1,16 @@
-//! Mahony's filter for gyro and accelerometer, in the form small flight controllers have always flown.
+//! Mahony's filter for gyro and accelerometer, as used in many small flight controllers.
 //!
-//! Gravity as the accelerometer sees it and as the attitude predicts it differ by a rotation; a share of that rotation is
-//! added to the gyro's rate. One gain, four numbers of state, thirty multiplications. Use it to level a multirotor that
-//! has little else to do; it knows no gyro bias (a bias of b leaves a tilt of b/gain), takes every acceleration for gravity,
-//! and its heading is the integral of the gyro.
+//! Measured and predicted gravity differ by a rotation; a share of it is added to the gyro's rate.
+//! One gain, four numbers of state, thirty multiplications. Use it to level a multirotor at the
+//! least cost. It does not estimate the gyro bias (a bias b leaves a tilt of b/gain), treats every
+//! acceleration as gravity, and its heading is the integral of the gyro. Otherwise use
+//! [`AttitudeFilter`](super::AttitudeFilter).
 //!
-//! Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE TAC 53(5), 2008,
-//! without the integral term; integrated by one Euler step and normalised, as T. Nakagawa's STM32 flight controller does
-//! (2021). His page prints gravity's first two components with the signs of the inverse rotation, which would settle
-//! upside down; here they are right.
+//! Mahony, Hamel, Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE
+//! TAC 53(5), 2008, without the integral term; one Euler step and normalisation, as in T.
+//! Nakagawa's STM32 flight controller (2021). The published page gives gravity's first two
+//! components with the signs of the inverse rotation, which would settle upside down; the signs
+//! here are correct.
 
 use super::rotation::within;
 use stampfly_types::{Quat, Vec3, math};
@@ -35,24 +37,25 @@ pub struct Mahony {
 }
 
 impl Mahony {
-    /// Level, heading zero. `gain` in 1/s: rate of correction for a tilt error of a radian. 0.5 is usual.
+    /// Level, heading zero. `gain` in 1/s: correction rate per radian of tilt error. 0.5 is usual.
     #[must_use]
     pub fn new(gain: f32) -> Self {
         Self { gain, attitude: Quat::identity() }
     }
 
-    /// Body FRD → world NED; heading relative to where the filter started.
+    /// Body FRD → world NED. The heading is relative to the start.
     #[must_use]
     pub fn attitude(&self) -> Quat {
         self.attitude
     }
 
-    /// Takes the specific force (body FRD, any unit), the rate (body FRD, rad/s) and the time since the last step, s.
+    /// Takes the specific force (body FRD, any unit), the rate (body FRD, rad/s) and the time since
+    /// the last step, s.
     ///
-    /// A force of zero, or one that is not finite, corrects nothing. A rate that is not finite, or a time that is not
-    /// above zero, changes nothing. More than half a second is taken for half a second.
+    /// Without correction for a force that is zero or not finite. Ignored for a rate that is not
+    /// finite or a time that is not positive. Times above half a second count as half a second.
     pub fn step(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) {
-        // Rates beyond any sensor would overflow the quaternion.
+        // Larger rates, far beyond any sensor, would overflow the quaternion.
         if dt.is_nan() || dt <= 0.0 || !within(gyro, 1e6) {
             return;
         }

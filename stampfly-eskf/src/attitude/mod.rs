@@ -1,11 +1,11 @@
-//! Attitude alone: filters for bodies without a position sensor.
+//! Attitude filters for bodies without a position sensor.
 //!
 //! | filter | use it for | not for |
 //! |---|---|---|
-//! | [`AttitudeFilter`] | anything with gyro and accelerometer, magnetometer or not; unknown gyro bias; bent fields | – |
-//! | [`Mahony`] | the smallest thing that levels a quadcopter | unknown gyro bias, long accelerations |
+//! | [`AttitudeFilter`] | gyro and accelerometer, optional magnetometer; unknown gyro bias; distorted fields | – |
+//! | [`Mahony`] | levelling a multirotor with the least code | unknown gyro bias, long accelerations |
 //!
-//! Both are plain structs that know no clock: time enters as the length of a step.
+//! Both are plain structs without a clock: time enters as the length of a step.
 
 mod bias;
 mod bookkeeping;

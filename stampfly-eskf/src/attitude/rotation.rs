@@ -1,20 +1,20 @@
-//! Rotations as the attitude filters need them: from a rotation vector, and between two verticals.
+//! Rotations for the attitude filters: from a rotation vector, and between two verticals.
 //!
-//! Not for general use: [`Quat`] has what that needs. These avoid transcendental functions in the path of every sample and say
-//! what happens in the degenerate cases.
+//! For general use take [`Quat`]. These functions avoid transcendentals in the path of every sample
+//! and define the degenerate cases.
 
 use crate::filter::state::small_rotation;
 use stampfly_types::{Quat, Vec3, math};
 
-/// Is every component a number within ±`limit`?
+/// Whether every component is within ±`limit`; false for NaN.
 pub(super) fn within(vector: &Vec3, limit: f32) -> bool {
     // Comparisons with NaN are false.
     vector.iter().all(|value| value.abs() <= limit)
 }
 
-/// The rotation by a rotation vector, rad.
+/// Rotation by a rotation vector, rad.
 ///
-/// By the series to fifth order below a quarter of a radian, where it is exact to `f32`.
+/// By a series below a quarter of a radian, where it is exact to `f32`.
 pub(super) fn from_vector(vector: &Vec3) -> Quat {
     let half = vector * 0.5;
     let square = half.norm_squared();
@@ -28,12 +28,12 @@ pub(super) fn from_vector(vector: &Vec3) -> Quat {
     Quat::new_unchecked(cos, x, y, z)
 }
 
-/// The product, brought back to unit length; the first factor if rounding made nothing of it.
+/// Normalised product; the first factor if the product has degenerated.
 pub(super) fn product(first: &Quat, second: &Quat) -> Quat {
     let product = *first * *second;
     let square = product.norm_squared();
     if square > 0.25 && square < 4.0 {
-        // Never far from one: a Newton step of the inverse square root is exact to `f32`.
+        // Close to one: a second-order expansion of the inverse square root is exact to `f32`.
         let off = square - 1.0;
         let scale = if off.abs() < 1e-3 { 1.0 - off * (0.5 - 0.375 * off) } else { 1.0 / math::sqrt(square) };
         let [w, x, y, z] = product.wxyz().map(|value| value * scale);
@@ -43,9 +43,10 @@ pub(super) fn product(first: &Quat, second: &Quat) -> Quat {
     }
 }
 
-/// The shortest rotation that turns a specific force upwards, to (0, 0, −1). `None` in free fall.
+/// Shortest rotation that turns a specific force upwards, to (0, 0, −1). `None` in free fall.
 ///
-/// Its axis is level, so it changes no heading. A force that points straight down is turned about x.
+/// Its axis is horizontal, so the heading does not change. A force straight down is rotated about
+/// x.
 pub(super) fn upwards(force: &Vec3) -> Option<Quat> {
     let norm = force.norm();
     if norm.is_nan() || norm < 0.1 {

@@ -1,8 +1,10 @@
-//! Stationary detection (VQF's rest detection): a stationary body's gyro measures its bias.
+//! Stationary detection (VQF's rest detection): the gyro of a stationary body measures its bias.
 //!
-//! Gyro and accelerometer stay close to their own low-passed selves for a while, and the gyro's mean is small enough to be
-//! a bias. A turn that is slower than the largest bias, and perfectly smooth, is taken for rest: no inertial sensor can
-//! tell them apart, a field can ([`witness`](super::witness)). A vehicle whose motors run is never at rest for this detector.
+//! The body is stationary while gyro and accelerometer stay close to their low-passed values and
+//! the gyro's mean is small enough to be a bias. A perfectly smooth turn slower than the largest
+//! bias is taken for rest; inertial sensors cannot distinguish them, a magnetic field can
+//! ([`witness`](super::witness)). A vehicle with running motors is never stationary for this
+//! detector.
 //!
 //! After Laidig, Seel, "VQF", Information Fusion 91, 2023, section 3.4.
 
@@ -10,17 +12,18 @@ use super::config::AttitudeConfig;
 use super::low_pass::LowPass;
 use stampfly_types::Vec3;
 
-/// By so much the mean rate may change in the time that it takes to be at rest, rad/s: 0.3°/s. Noise of a small gyro, averaged alike, is a tenth of it.
+/// Largest change of the mean rate while the rest time runs, rad/s: 0.3°/s, ten times the averaged
+/// noise of a small gyro.
 const EVEN: f32 = 0.3 * core::f32::consts::PI / 180.0;
 
-/// Detects a stationary body.
+/// Detector of a stationary body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StationaryDetector {
     gyro: LowPass<3>,
     accel: LowPass<3>,
     quiet_for: f32,
-    /// Mean rate when it became quiet.
+    /// Mean rate at the time when it became quiet.
     first: Vec3,
 }
 
@@ -30,7 +33,7 @@ impl StationaryDetector {
         Self { gyro: low_pass, accel: low_pass, quiet_for: 0.0, first: Vec3::zeros() }
     }
 
-    /// Takes an inertial sample; `calibrated` is the gyro bias of the start.
+    /// Takes an inertial sample. `calibrated` is the gyro bias of the start.
     pub fn step(&mut self, config: &AttitudeConfig, accel: &Vec3, gyro: &Vec3, calibrated: &Vec3, dt: f32) {
         self.gyro.step(&(*gyro).into(), dt);
         self.accel.step(&(*accel).into(), dt);
@@ -40,27 +43,27 @@ impl StationaryDetector {
         if self.quiet_for <= 0.0 {
             self.first = self.rate();
         }
-        // A bias stays the same for a while; a rate that changes is motion.
+        // A bias is constant over the rest time; a changing rate is motion.
         let even = self.quiet_for >= config.rest_time || (self.rate() - self.first).norm() < EVEN;
         self.quiet_for = if quiet && even { (self.quiet_for + dt).min(config.rest_time) } else { 0.0 };
     }
 
-    /// It was no rest, whatever it looked like.
+    /// Ends a rest that proved false.
     pub fn end(&mut self) {
         self.quiet_for = 0.0;
     }
 
-    /// Is it quiet, perhaps not yet for long enough?
+    /// Whether it is quiet, for however short a time.
     pub fn is_quiet(&self) -> bool {
         self.quiet_for > 0.0
     }
 
-    /// Has it been quiet for long enough?
+    /// Whether it has been quiet for the rest time.
     pub fn is_stationary(&self, config: &AttitudeConfig) -> bool {
         self.quiet_for >= config.rest_time
     }
 
-    /// Mean rate of the last moment, rad/s.
+    /// Low-passed rate, rad/s.
     pub fn rate(&self) -> Vec3 {
         (*self.gyro.value()).into()
     }
@@ -71,7 +74,7 @@ mod tests {
     use super::*;
     use stampfly_types::GRAVITY;
 
-    /// Time until a stationary body is detected, s, if it is within five seconds.
+    /// Time until a stationary body is detected, s; `None` after five seconds.
     fn detected_after(rate: impl Fn(u16) -> f32, force: impl Fn(u16) -> f32) -> Option<f32> {
         let config = AttitudeConfig::default();
         let mut detector = StationaryDetector::new(&config);

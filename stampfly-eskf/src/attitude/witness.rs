@@ -1,59 +1,66 @@
-//! Does the magnetic field confirm a rest? A body that turns slowly and evenly looks at rest to gyro and accelerometer, and its
-//! rate is taken for bias. The field in the body turns with it all the same.
+//! Tests a rest against the magnetic field.
 //!
-//! | | condition |
-//! |---|---|
-//! | start | the body becomes quiet: the field of that moment is remembered, and with the rest the bias before it |
-//! | contradicted | the field's direction has turned by more than [`TURNED`], as strong as before, and the gyro may have seen such a turn |
-//! | then | the rest ends; the bias is the one before it, and the turn that was taken for bias is made up for |
-//! | confirmed | [`CONFIRMS`] long the field has not turned by half of that: the bias stays, whatever comes |
+//! A body that turns slowly and evenly looks stationary to gyro and accelerometer, and its rate is
+//! taken for bias. The field in the body still turns with it.
 //!
-//! A magnet that passes a body at rest turns the field as well. It also changes its strength, or the gyro has not seen
-//! anything that fits; then it is the new field of the same rest. Slower turns than 0.1°/s remain bias, and so do those of a
-//! body without a magnetometer.
+//! - **Start**: the body becomes quiet. The field at that time is stored, and with the rest the
+//!   bias before it.
+//! - **Contradicted**: the direction of the field has changed by more than [`TURNED`] at the same
+//!   strength, and the gyro is consistent with such a turn. The rest ends, the bias before it is
+//!   restored, and the turn that was taken for bias is added to the attitude.
+//! - **Confirmed**: within [`CONFIRMS`] the field has not turned by half of that. The bias is kept
+//!   from then on.
+//!
+//! A magnet that passes a body at rest turns the field, too, but changes its strength or does not
+//! fit the gyro; the new field then belongs to the same rest. Turns slower than 0.1°/s remain bias,
+//! and so do those of a body without a magnetometer.
 
 use super::bias::{GyroBias, KnownBias};
 use super::config::AttitudeConfig;
 use stampfly_types::{Vec3, math};
 
-/// The noise of a small magnetometer, low-passed over half a second, stays below 0.4°, rad.
+/// Change of the field's direction that contradicts a rest, rad. The noise of a small magnetometer,
+/// low-passed over half a second, stays below 0.4°.
 const TURNED: f32 = 1.5 * core::f32::consts::PI / 180.0;
-/// While the field stays this near, the body has not turned and come back, rad.
+/// Largest change of direction that excludes a turn and its return, rad.
 const STAYED: f32 = 0.5 * TURNED;
-/// A turn that moves the field by less is not seen when a rest ends, rad: twice the noise.
+/// Smallest change of direction that is visible at the end of a rest, rad: twice the noise.
 const VISIBLE: f32 = 0.8 * core::f32::consts::PI / 180.0;
-/// A bias so many standard deviations from the one before is none, where the field cannot say.
+/// Number of standard deviations from the bias before, above which a bias is rejected where the
+/// field cannot decide.
 const UNLIKELY: f32 = 2.0;
-/// So long a rest without a turn shows the bias to less than a tenth of a degree a second, s.
+/// Duration of a rest without a turn that confirms the bias to less than a tenth of a degree per
+/// second, s.
 const CONFIRMS: f32 = 20.0;
-/// A field whose strength changed by this share of what is tolerated of a reference was bent, not turned.
+/// Change of the strength, as a share of the reference tolerance, above which the field was
+/// distorted and not turned.
 const BENT: f32 = 0.5;
 
-/// What is made up for when a rest was none.
+/// A rest proved false.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contradiction {
-    /// What the rest did; `None` when the body had only been quiet.
+    /// Effects of the rest to revert; `None` if the body had only been quiet.
     pub undo: Option<Undo>,
 }
 
-/// What a rest that was none did.
+/// Effects of a false rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Undo {
-    /// The bias before it.
+    /// The bias before the rest.
     pub bias: KnownBias,
-    /// By how much the body turned that was taken for bias, body, rad, and how well that is known, rad.
+    /// Rotation that was taken for bias, body, rad, and its standard deviation, rad.
     pub turned: Vec3,
     pub sigma: f32,
 }
 
-/// A rest that may still be contradicted.
+/// A rest that is not yet confirmed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Rest {
     before: KnownBias,
     turned: Vec3,
     lasts: f32,
-    /// How far the field has been from the first one, rad.
+    /// Largest change of the field's direction so far, rad.
     farthest: f32,
 }
 
@@ -63,15 +70,15 @@ impl Rest {
     }
 }
 
-/// Compares the field with that of the beginning of a rest.
+/// Comparison of the field with that at the start of a rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Witness {
-    /// Mean of the last moment; zero before the first.
+    /// Low-passed field; zero before the first sample.
     field: Vec3,
     /// The field when the body became quiet.
     first: Option<Vec3>,
-    /// For how long it has been quiet since, s.
+    /// Time since then, s.
     quiet_for: f32,
     rest: Option<Rest>,
 }
@@ -81,20 +88,20 @@ impl Witness {
         Self { field: Vec3::zeros(), first: None, quiet_for: 0.0, rest: None }
     }
 
-    /// Another hard iron is taken out of the field from now on.
+    /// Restarts after a change of the hard iron that is subtracted.
     pub fn start_over(&mut self) {
         (self.field, self.first) = (Vec3::zeros(), None);
     }
 
-    /// The body is not quiet. A rest that ends before it was confirmed is one if the field fits it better than a turn; where no
-    /// difference would be seen, if the bias that it showed is likely.
+    /// The body moves. A rest that ends unconfirmed is false if the field fits a turn better than a
+    /// rest or, where the difference would not be visible, if the bias that it found is unlikely.
     pub fn moves(&mut self, bias: &GyroBias) -> Option<Contradiction> {
         let (first, rest) = (self.first.take(), self.rest.take());
         self.quiet_for = 0.0;
         let (first, rest) = (first?, rest?);
         let Rest { before, turned, .. } = rest;
         let now = self.field;
-        // The world as the body sees it turns the other way.
+        // The world rotates in the body in the opposite direction.
         let expected = first - turned.cross(&first);
         let turns = if (expected - first).norm() > VISIBLE * first.norm() {
             (now - expected).norm() < (now - first).norm()
@@ -104,7 +111,7 @@ impl Witness {
         turns.then(|| Contradiction { undo: Some(rest.undo()) })
     }
 
-    /// The body is quiet, and at rest with `rests`; `bias` is the one that this step has integrated with.
+    /// The body is quiet, and stationary if `rests`. `bias` is the one used in this step.
     pub fn is_quiet(&mut self, rests: bool, bias: &GyroBias, dt: f32) {
         self.quiet_for += dt;
         if !rests {
@@ -121,8 +128,8 @@ impl Witness {
         }
     }
 
-    /// Takes a field, body, µT, free of hard iron, `dt` seconds after the one before; `rate` is the gyro's mean of the last
-    /// moment, with its bias, and `bias` the present one.
+    /// Takes a field, body, µT, without hard iron, `dt` seconds after the last one. `rate` is the
+    /// gyro's mean including its bias, `bias` the present estimate.
     pub fn field(
         &mut self,
         config: &AttitudeConfig,

@@ -1,10 +1,12 @@
-//! Everything that calibrations have found of one vehicle, and its use on samples.
+//! Results of all calibrations of one vehicle, and their application to samples.
 //!
-//! [`Corrections`] are the numbers: a part of a vehicle's configuration, kept as parameters. [`Corrector`] applies them where a
-//! driver's samples become everybody's, so nobody behind it pays for them. Without a calibration a sample goes through bit for bit.
+//! [`Corrections`] are the numbers, kept as parameters of the vehicle. A [`Corrector`] applies them
+//! once, where a driver's samples are published. Without a calibration a sample passes unchanged,
+//! bit for bit.
 //!
-//! Order: drift with temperature, accelerometer's bias and scale, tilt of the sensor. Not for what changes from one power-on to the
-//! next: that is [`StillCalibration`](super::StillCalibration)'s, and later the estimator's.
+//! Order: drift with temperature, bias and scale of the accelerometer, tilt of the sensor. Not for
+//! quantities that change from one power-on to the next: those belong to
+//! [`StillCalibration`](super::StillCalibration) and the estimator.
 
 use super::{AccelCorrection, Trim};
 use stampfly_types::Vec3;
@@ -14,9 +16,9 @@ use stampfly_types::messages::{CalibrationKind, CalibrationReport, CalibrationSt
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LevelCorrection {
-    /// The sensor is rolled by this against the airframe, rad.
+    /// Roll of the sensor relative to the airframe, rad.
     pub roll: f32,
-    /// The sensor is pitched by this against the airframe, rad.
+    /// Pitch of the sensor relative to the airframe, rad.
     pub pitch: f32,
 }
 
@@ -26,9 +28,9 @@ pub struct LevelCorrection {
 pub struct IronCorrection {
     /// Hard iron, body FRD, µT.
     pub offset: Vec3,
-    /// The matrix's diagonal.
+    /// Diagonal of the matrix.
     pub diagonal: Vec3,
-    /// What is beside it: xy, xz, yz.
+    /// Off-diagonal elements: xy, xz, yz.
     pub across: Vec3,
 }
 
@@ -39,7 +41,7 @@ impl Default for IronCorrection {
 }
 
 impl IronCorrection {
-    /// The field behind a measurement, body FRD, µT.
+    /// The corrected field, body FRD, µT.
     #[must_use]
     pub fn correct(&self, measured: Vec3) -> Vec3 {
         let (field, Vec3 { x: xy, y: xz, z: yz }) = (measured - self.offset, self.across);
@@ -47,7 +49,8 @@ impl IronCorrection {
             + Vec3::new(xy * field.y + xz * field.z, xy * field.x + yz * field.z, xz * field.x + yz * field.y)
     }
 
-    /// What was measured of a field that [`correct`](Self::correct) gave. `None` of a matrix without an inverse.
+    /// The measurement that [`correct`](Self::correct) maps to this field. `None` for a singular
+    /// matrix.
     #[must_use]
     pub fn undo(&self, field: Vec3) -> Option<Vec3> {
         let (Vec3 { x: a, y: b, z: c }, Vec3 { x: xy, y: xz, z: yz }) = (self.diagonal, self.across);
@@ -56,15 +59,15 @@ impl IronCorrection {
     }
 }
 
-/// What changes with the sensor's temperature, in a straight line.
+/// Linear drift with the temperature of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriftCorrection {
-    /// Nothing is corrected at this temperature, °C.
+    /// Temperature without correction, °C.
     pub reference: f32,
-    /// Bias of the gyro, body FRD, rad/s a kelvin.
+    /// Gyro bias per kelvin, body FRD, rad/s/K.
     pub gyro: Vec3,
-    /// Bias of the accelerometer, body FRD, m/s² a kelvin.
+    /// Accelerometer bias per kelvin, body FRD, m/s²/K.
     pub accel: Vec3,
 }
 
@@ -74,7 +77,7 @@ impl Default for DriftCorrection {
     }
 }
 
-/// What calibrations have found. The default corrects nothing.
+/// Results of all calibrations. The default corrects nothing.
 ///
 /// ```
 /// use stampfly_eskf::calibration::{Corrections, Corrector};
@@ -88,34 +91,35 @@ impl Default for DriftCorrection {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Corrections {
-    /// Accelerometer's bias and scale.
+    /// Bias and scale of the accelerometer.
     pub accel: AccelCorrection,
     /// Tilt of the inertial sensor.
     pub level: LevelCorrection,
-    /// Magnetometer's iron.
+    /// Hard and soft iron of the magnetometer.
     pub mag: IronCorrection,
     /// Drift with temperature.
     pub drift: DriftCorrection,
 }
 
 impl Corrections {
-    /// The trim that straightens the sensor.
+    /// The rotation from the sensor to the airframe.
     #[must_use]
     pub fn trim(&self) -> Trim {
         Trim::of(self.level.roll, self.level.pitch)
     }
 
-    /// The specific force as the sensor measured it, body FRD, m/s², but for its drift: of one that was corrected.
+    /// The measured specific force, body FRD, m/s², of a corrected one; the drift stays corrected.
     #[must_use]
     pub fn undo_accel(&self, corrected: Vec3) -> Vec3 {
         let AccelCorrection { bias, scale } = self.accel;
         self.trim().undo(corrected).component_div(&scale) + bias
     }
 
-    /// Takes what a calibration has found, for the next start. False if it has found nothing; nothing is changed then.
+    /// Adopts the result of a calibration, for the next start. Returns false and changes nothing if
+    /// there is no result.
     ///
-    /// The level is that of the corrected accelerometer. So six positions make an earlier level void, and a level is to be found anew
-    /// after them.
+    /// The level trim is computed from corrected accelerations. A six-position calibration
+    /// therefore clears an earlier level trim, which must be repeated after it.
     ///
     /// ```
     /// use stampfly_eskf::calibration::Corrections;
@@ -137,6 +141,8 @@ impl Corrections {
         match report.kind {
             CalibrationKind::None => return false,
             CalibrationKind::Level => {
+                // The report holds the uncorrected mean force, so that the trim fits the present
+                // correction.
                 let trim = Trim::levelling(&self.accel.correct(first));
                 self.level = LevelCorrection { roll: trim.roll, pitch: trim.pitch };
             }
@@ -155,11 +161,12 @@ impl Corrections {
     }
 }
 
-/// The temperature that corrects follows the sensor's in steps of this, K: its noise must not make a sensor that repeats itself look
-/// as if it measured. A step changes a rate by less than the noise of one sample.
+/// The drift correction follows the temperature in steps of this size, K. Otherwise the
+/// temperature's noise would make a sensor that repeats one value look alive. A step changes a rate
+/// by less than the noise of one sample.
 const STEP: f32 = 0.5;
 
-/// Applies [`Corrections`] to samples, in their order.
+/// Applies [`Corrections`] to samples.
 ///
 /// ```
 /// use stampfly_eskf::calibration::{Corrections, Corrector};
@@ -174,19 +181,19 @@ const STEP: f32 = 0.5;
 pub struct Corrector {
     corrections: Corrections,
     trim: Option<Trim>,
-    /// By which temperature the drift is corrected; `None` before the first, and without a drift.
+    /// Temperature used for the drift correction; `None` before the first one, and without drift.
     temperature: Option<f32>,
 }
 
 impl Corrector {
-    /// With what was found.
+    /// A corrector with these corrections.
     #[must_use]
     pub fn new(corrections: &Corrections) -> Self {
         let trim = (corrections.level != LevelCorrection::default()).then(|| corrections.trim());
         Self { corrections: *corrections, trim, temperature: None }
     }
 
-    /// What it corrects with.
+    /// The corrections in use.
     #[must_use]
     pub const fn corrections(&self) -> &Corrections {
         &self.corrections
@@ -216,8 +223,8 @@ impl Corrector {
         }
     }
 
-    /// Corrects a magnetic sample. The sensor's own axes are those that the still earth shows, so it is not turned by the tilt of the
-    /// inertial sensor, which is another chip.
+    /// Corrects a magnetic sample. It is not rotated by the trim, which belongs to the inertial
+    /// sensor, another chip.
     pub fn mag(&self, sample: &mut MagData) {
         let iron = &self.corrections.mag;
         if *iron != IronCorrection::default() {
@@ -259,7 +266,7 @@ mod tests {
         let mut corrector = Corrector::new(&found);
         let mut last = None;
         for k in 0..200_u16 {
-            // The temperature goes on measuring.
+            // Only the temperature changes.
             let temperature = 30.0 + 0.02 * f32::from(k % 7);
             let mut sample = ImuData { gyro: Vec3::new(0.25, 0.0, 0.0), temperature, ..Default::default() };
             corrector.imu(&mut sample);

@@ -1,54 +1,57 @@
-//! Drift of gyro and accelerometer with temperature, as a straight line.
+//! Linear drift of gyro and accelerometer with temperature.
 //!
-//! A small vehicle's sensor warms up by ten degrees and more between power-on and landing, and its bias moves with it. While the vehicle
-//! lies still, its mean rate is the gyro's bias, and what changes of its mean specific force is the accelerometer's; the line through
-//! them over the temperature is the drift.
+//! The sensor of a small vehicle warms up by ten degrees and more between power-on and landing, and
+//! its bias drifts. While the vehicle lies still, its mean rate is the gyro bias, and changes of
+//! its mean specific force are those of the accelerometer bias. A line fitted over temperature is
+//! the drift.
 //!
-//! Use it where the range is some ten degrees and a result has to be a few numbers. Where the curve matters,
-//! [`TemperatureTable`](super::TemperatureTable) learns one. It finds slopes: the bias itself is found after every power-on.
+//! Use it for a range of some ten degrees and a result of a few numbers. For a curved dependence
+//! use [`TemperatureTable`](super::TemperatureTable). It finds slopes only; the bias itself is
+//! found after every power-on.
 //!
-//! Method: sums of squares about running means (B. P. Welford, "Note on a method for calculating corrected sums of squares and
-//! products", Technometrics 1962), within each stretch of lying in one attitude, pooled over them.
+//! Method: sums of squares about running means (B. P. Welford, "Note on a method for calculating
+//! corrected sums of squares and products", Technometrics 1962), separately for each attitude in
+//! which the vehicle lies, then pooled.
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3, math};
 
-/// Why a sample or a stretch was not taken.
+/// Reason for which a sample or a stretch was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DriftRefusal {
-    /// It moves.
+    /// The vehicle moves.
     Moving(NotStill),
-    /// The sensor gave no temperature.
+    /// The sensor has no temperature.
     NoTemperature,
 }
 
-/// A drift that was found.
+/// A fitted drift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Of the gyro, body FRD, rad/s a kelvin.
+    /// Of the gyro, body FRD, rad/s/K.
     pub gyro: Vec3,
-    /// Of the accelerometer, body FRD, m/s² a kelvin.
+    /// Of the accelerometer, body FRD, m/s²/K.
     pub accel: Vec3,
     /// Mean temperature, °C.
     pub temperature: f32,
-    /// Root mean square of what the gyro changed by, all axes, rad/s.
+    /// Root mean square of the gyro's changes, all axes, rad/s.
     pub before: f32,
-    /// The same about the line.
+    /// The same about the fitted line.
     pub residual: f32,
 }
 
-/// Sums about the means of one attitude; the squares go on over all of them.
+/// Sums about the means of one attitude. The squares and products are kept over all attitudes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
-    /// Stretches since it was last moved.
+    /// Stretches in this attitude.
     count: f32,
     temperature: f32,
     gyro: Vec3,
     accel: Vec3,
-    /// Stretches in all.
+    /// Stretches in all attitudes.
     all: f32,
     temperature_squares: f32,
     gyro_products: Vec3,
@@ -64,7 +67,7 @@ impl Sums {
         self.temperature += warmer / self.count;
         self.gyro += gyro / self.count;
         self.accel += accel / self.count;
-        // One distance from the mean before, one from the mean after.
+        // Welford: the distance from the old mean times the distance from the new one.
         let after = temperature - self.temperature;
         self.temperature_squares += warmer * after;
         self.gyro_products += gyro * after;
@@ -77,7 +80,7 @@ impl Sums {
     }
 }
 
-/// Finds the drift while a vehicle lies still and warms up or cools down.
+/// Fit of the drift while a vehicle lies still and warms up or cools down.
 ///
 /// ```
 /// use stampfly_eskf::calibration::DriftFit;
@@ -97,32 +100,33 @@ impl Sums {
 pub struct DriftFit {
     average: StillAverage,
     sums: Sums,
-    /// Coldest and warmest since it was last moved, °C.
+    /// Coldest and warmest temperature in this attitude, °C.
     span: [f32; 2],
-    /// The widest of them, K.
+    /// Largest range of temperature in one attitude, K.
     widest: f32,
 }
 
 const NO_SPAN: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 impl Default for DriftFit {
-    /// A stretch is one second at 400 Hz, in which the temperature is as good as constant.
+    /// A stretch is one second at 400 Hz, in which the temperature is practically constant.
     fn default() -> Self {
         Self::new(StillnessConfig { samples: 400, force_range: [7.8, 11.8], ..Default::default() })
     }
 }
 
 impl DriftFit {
-    /// Nothing collected yet.
+    /// A fit without data.
     #[must_use]
     pub fn new(still: StillnessConfig) -> Self {
         Self { average: StillAverage::new(still), sums: Sums::default(), span: NO_SPAN, widest: 0.0 }
     }
 
-    /// Takes an inertial sample. True when a stretch has just been taken.
+    /// Takes an inertial sample. Returns true when a stretch has been completed.
     ///
     /// # Errors
-    /// Why the sample, or with its last sample the stretch, does not count. What was taken before stays.
+    /// The reason for which the sample, or with its last sample the stretch, is not used. Earlier
+    /// stretches stay.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<bool, DriftRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
@@ -144,13 +148,13 @@ impl DriftFit {
         }
     }
 
-    /// How far the temperature has moved while it lay in one attitude, K.
+    /// Largest change of temperature in one attitude, K.
     #[must_use]
     pub fn span(&self) -> f32 {
         self.widest
     }
 
-    /// The drift. `None` while the temperature has not moved.
+    /// The drift. `None` while the temperature has not changed.
     #[must_use]
     pub fn solve(&self) -> Option<Drift> {
         let Sums { all, temperature_squares, gyro_products, accel_products, gyro_squares, .. } = self.sums;

@@ -1,35 +1,39 @@
-//! Magnetometer hard and soft iron: the ellipsoid through samples of all directions.
+//! Magnetometer hard and soft iron from an ellipsoid fit.
 //!
-//! Turned every way in a constant field, an ideal magnetometer draws a sphere about zero. Magnets on board shift it (hard
-//! iron), steel and unequal gains stretch it (soft iron). Fitting the ellipsoid gives both back.
+//! Turned in all directions in a constant field, an ideal magnetometer measures a sphere about
+//! zero. Magnets on board shift it (hard iron), steel and unequal gains stretch it (soft iron). The
+//! fit of an ellipsoid gives both.
 //!
-//! Use it outdoors or far from steel, once a vehicle and place. Not while motors run: their field follows their
-//! current. Not for the orientation of the sensor, which lengths alone do not show; the correction found is the symmetric one.
+//! Use it outdoors or away from steel, once per vehicle and place. Not while motors run: their
+//! field follows their current. The orientation of the sensor cannot be found from lengths alone;
+//! the correction is the symmetric one.
 //!
-//! Method: the quadric with trace(A) = 3, linear in nine unknowns (Q. Li, J. G. Griffiths, "Least squares ellipsoid specific
-//! fitting", GMP 2004, for quadrics in general), solved by a triangular factor that takes one sample after the other.
-//! Coordinates are counted from the first sample, so hard iron of any size costs no digits.
+//! Method: the quadric with trace(A) = 3, linear in nine unknowns (Q. Li, J. G. Griffiths, "Least
+//! squares ellipsoid specific fitting", GMP 2004, for quadrics in general), solved by a triangular
+//! factor that takes one sample after the other. Coordinates are relative to the first sample, so a
+//! large hard iron costs no precision.
 
 use super::least_squares::LeastSquares;
 use super::principal_axes::principal_axes;
 use nalgebra::Matrix3;
 use stampfly_types::{Vec3, math};
 
-/// What is accepted.
+/// Limits for samples and results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EllipsoidConfig {
-    /// A sample nearer than this to the last one taken is left out, µT: waiting must not outweigh turning.
+    /// Smallest distance between samples, µT, so that a pause does not outweigh turning.
     pub spacing: f32,
-    /// Samples needed.
+    /// Smallest number of samples.
     pub samples_min: u32,
-    /// Directions needed, as a share of the 26 looked at.
+    /// Smallest share of the 26 directions that must be covered.
     pub coverage_min: f32,
-    /// Field strengths believed, µT. That of the earth is 22 to 67 µT, and gains differ.
+    /// Accepted field strengths, µT. The earth's is 22 to 67 µT, and gains differ.
     pub strength_range: [f32; 2],
-    /// Longest axis over shortest: more is a broken sensor. Samples as flat as that are refused as well.
+    /// Largest ratio of the longest to the shortest axis; more is a broken sensor. Also limits the
+    /// flatness of the samples.
     pub stretch_max: f32,
-    /// Largest root mean square of the corrected strength's error, as a share of the strength.
+    /// Largest root mean square error of the corrected strength, as a share of the strength.
     pub residual_max: f32,
 }
 
@@ -46,83 +50,84 @@ impl Default for EllipsoidConfig {
     }
 }
 
-/// Why a sample was not taken.
+/// Reason for which a sample was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MagRefusal {
-    /// A number in it is not finite.
+    /// A value is NaN or infinite.
     NotFinite,
-    /// Too near to the last one taken to say anything new.
+    /// Closer to the last used sample than `spacing`.
     TooNear,
-    /// So far from the first one that they cannot lie on one ellipsoid.
+    /// Too far from the first sample for one ellipsoid.
     TooFar,
 }
 
-/// Why there is no result.
+/// Reason for which there is no result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum EllipsoidFailure {
-    /// Fewer samples than needed.
+    /// Too few samples.
     TooFew {
-        /// Samples taken.
+        /// Samples used.
         samples: u32,
     },
-    /// The samples are much wider one way than another: in a plane, on a line, on a cap.
+    /// The samples are much wider in one direction than in another: in a plane, on a line, on a
+    /// cap.
     Flat {
-        /// Least width over largest.
+        /// Smallest width divided by the largest.
         flatness: f32,
     },
-    /// What fits best is no ellipsoid, or nothing fits best.
+    /// The best fit is not an ellipsoid, or not unique.
     NotPositive,
     /// The field is too weak or too strong.
     Strength {
         /// Mean radius, µT.
         strength: f32,
     },
-    /// The axes are too different.
+    /// The axes differ too much.
     Stretched {
-        /// Longest over shortest.
+        /// Longest axis divided by the shortest.
         stretch: f32,
     },
-    /// Too few directions have been seen.
+    /// Too few directions were covered.
     Coverage {
         /// Share of the 26 directions.
         coverage: f32,
     },
-    /// The samples do not lie on the ellipsoid: the field changed meanwhile.
+    /// The samples do not lie on the ellipsoid: the field changed.
     Residual {
         /// Root mean square, as a share of the strength.
         residual: f32,
     },
 }
 
-/// How good a result is.
+/// Quality of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EllipsoidQuality {
-    /// Root mean square of the corrected strength's error, µT.
+    /// Root mean square error of the corrected strength, µT.
     pub residual: f32,
-    /// Share of 26 directions, evenly around, that a sample came within 30° of.
+    /// Share of 26 evenly spaced directions with a sample within 30°.
     pub coverage: f32,
-    /// Longest axis over shortest: soft iron. One is a sphere.
+    /// Longest axis divided by the shortest: the soft iron. One is a sphere.
     pub stretch: f32,
-    /// Samples taken.
+    /// Samples used.
     pub samples: u32,
 }
 
-/// Corrects a magnetometer: matrix · (measured − offset).
+/// Magnetometer correction: matrix · (measured − offset).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MagCorrection {
     /// Hard iron, body FRD, µT.
     pub offset: Vec3,
-    /// Inverse of the soft iron, symmetric; its determinant is one.
+    /// Inverse of the soft iron; symmetric, with determinant one.
     pub matrix: Matrix3<f32>,
     /// Strength of the corrected field, µT.
     pub strength: f32,
 }
 
 impl MagCorrection {
-    /// The field behind a measurement, body FRD, µT.
+    /// The corrected field, body FRD, µT.
     #[inline]
     #[must_use]
     pub fn correct(&self, measured: Vec3) -> Vec3 {
@@ -130,13 +135,13 @@ impl MagCorrection {
     }
 }
 
-/// Of the quadric.
+/// Unknowns of the quadric.
 const UNKNOWNS: usize = 9;
-/// Coordinates are counted in this, µT, so that their squares are near one.
+/// Unit of the coordinates, µT, so that their squares are close to one.
 const UNIT: f32 = 50.0;
-/// Cosine of 30°: samples that near to both poles are as wide as this share of the diameter.
+/// Cosine of 30°. Samples that close to both poles span at least this share of the diameter.
 const NEAR: f32 = 0.866;
-/// Three faces, six edges and four corners of a cube: with their opposites, 26 directions.
+/// Three face, six edge and four corner directions of a cube. With their opposites they are 26.
 const DIRECTIONS: [[f32; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
@@ -153,14 +158,14 @@ const DIRECTIONS: [[f32; 3]; 13] = [
     [1.0, -1.0, -1.0],
 ];
 
-/// Fits the ellipsoid, sample by sample.
+/// Ellipsoid fit, sample by sample.
 ///
 /// ```
 /// use stampfly_eskf::calibration::EllipsoidFit;
 /// use stampfly_types::{Vec3, math};
 /// let mut fit = EllipsoidFit::default();
 /// for k in 0..400 {
-///     // A spiral over the sphere, 48 µT, shifted and stretched.
+/// // A spiral over the sphere, 48 µT, shifted and stretched.
 ///     let z = 1.0 - k as f32 / 200.0;
 ///     let (sin, cos) = math::sin_cos(k as f32 * 0.5);
 ///     let across = math::sqrt(1.0 - z * z);
@@ -175,11 +180,11 @@ const DIRECTIONS: [[f32; 3]; 13] = [
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EllipsoidFit {
     config: EllipsoidConfig,
-    /// The first sample, and the last one taken, µT.
+    /// The first and the last used sample, µT.
     origin: Vec3,
     last: Vec3,
     quadric: LeastSquares<{ UNKNOWNS + 1 }>,
-    /// Least and most along each direction, from the first sample.
+    /// Smallest and largest component along each direction, relative to the first sample.
     extent: [[f32; 2]; 13],
     samples: u32,
 }
@@ -191,7 +196,7 @@ impl Default for EllipsoidFit {
 }
 
 impl EllipsoidFit {
-    /// No sample yet.
+    /// A fit without samples.
     #[must_use]
     pub fn new(config: EllipsoidConfig) -> Self {
         Self {
@@ -204,7 +209,7 @@ impl EllipsoidFit {
         }
     }
 
-    /// Samples taken so far.
+    /// Number of samples used.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.samples
@@ -213,7 +218,7 @@ impl EllipsoidFit {
     /// Takes a field, body FRD, µT.
     ///
     /// # Errors
-    /// Why it was left out.
+    /// The reason for which it was not used.
     pub fn add(&mut self, field: &Vec3) -> Result<(), MagRefusal> {
         if !field.iter().all(|v| v.is_finite()) {
             return Err(MagRefusal::NotFinite);
@@ -226,7 +231,7 @@ impl EllipsoidFit {
         let from_origin = field - self.origin;
         let [_, strongest] = self.config.strength_range;
         if from_origin.amax() > 2.0 * strongest * self.config.stretch_max {
-            // A first sample that no other agrees with was the wrong one.
+            // If the second to fifth sample contradict the first, the first was wrong.
             if self.samples < 5 {
                 *self = Self::new(self.config);
             }
@@ -247,17 +252,17 @@ impl EllipsoidFit {
         Ok(())
     }
 
-    /// Offset, matrix and strength, and how well they fit.
+    /// Offset, matrix and strength, with their quality.
     ///
     /// # Errors
-    /// Why there are none.
+    /// The reason for which there is no result.
     pub fn solve(&self) -> Result<(MagCorrection, EllipsoidQuality), EllipsoidFailure> {
         let config = &self.config;
         let samples = self.samples;
         if samples < config.samples_min.max(UNKNOWNS as u32 + 1) {
             return Err(EllipsoidFailure::TooFew { samples });
         }
-        // A cap with noise is fitted well by an ellipsoid as flat as the cap, so the fit cannot be the judge of this.
+        // Tested on the samples: a noisy cap is fitted well by an ellipsoid as flat as the cap.
         let flatness = self.flatness();
         if flatness.is_nan() || flatness * config.stretch_max < NEAR {
             return Err(EllipsoidFailure::Flat { flatness });
@@ -274,12 +279,13 @@ impl EllipsoidFit {
         if !(least > 0.0 && square > 0.0 && squares.sum().is_finite() && square.is_finite()) {
             return Err(EllipsoidFailure::NotPositive);
         }
-        // Radius of the sphere of the same volume.
+        // Radius of the sphere with the same volume.
         let gain = math::cbrt(math::sqrt(squares.x * squares.y * squares.z));
         let strength = math::sqrt(square) / gain * UNIT;
         let stretch = math::sqrt(most / least);
         let coverage = self.coverage(&center, &inverse, square);
-        // (x − c)ᵀ·A·(x − c) is the square of the corrected strength, so half its relative error is that of the strength.
+        // (x − c)ᵀ·A·(x − c) is the squared corrected strength: half its relative error is that of
+        // the strength.
         let residual = 0.5 * self.quadric.residual() / square / math::sqrt(samples as f32 - UNKNOWNS as f32);
         let [weakest, strongest] = config.strength_range;
         if stretch > config.stretch_max {
@@ -300,14 +306,14 @@ impl EllipsoidFit {
         Ok((correction, EllipsoidQuality { residual: residual * strength, coverage, stretch, samples }))
     }
 
-    /// Least width of the samples over the largest.
+    /// Smallest width of the samples divided by the largest.
     fn flatness(&self) -> f32 {
         let widths = self.extent.iter().zip(DIRECTIONS).map(|([low, high], d)| (high - low) / Vec3::from(d).norm());
         let (least, most) = widths.fold((f32::INFINITY, 0.0f32), |(least, most), w| (least.min(w), most.max(w)));
         least / most
     }
 
-    /// Share of directions in which the samples reach the ellipsoid, or nearly so.
+    /// Share of the directions in which the samples reach at least `NEAR` of the ellipsoid.
     fn coverage(&self, center: &Vec3, inverse: &Matrix3<f32>, square: f32) -> f32 {
         let reached: usize = self
             .extent

@@ -1,16 +1,16 @@
-//! Least squares that takes one equation after the other: a triangular (QR) factor and Givens rotations.
+//! Recursive least squares with a triangular (QR) factor and Givens rotations.
 //!
-//! The normal equations would square the condition number, for which `f32` has no room; this factor has the condition of
-//! the equations themselves, and shows the residual without a difference of large numbers. Golub, Van Loan, "Matrix
-//! Computations", 4th edition, sections 5.1.8 and 6.5.
+//! Normal equations would square the condition number, which `f32` cannot represent. This factor
+//! keeps the condition of the equations and gives the residual without cancellation. Golub, Van
+//! Loan, "Matrix Computations", 4th edition, sections 5.1.8 and 6.5.
 
 use stampfly_types::math;
 
-/// A pivot below this share of its column means that the column depends on the ones before it.
+/// A pivot below this share of its column means that the column depends on the preceding ones.
 const DEPENDENT: f32 = 1e-4;
 
-/// Equations in `WIDTH` − 1 unknowns, as the triangular factor of their QR decomposition. The right-hand side is the last
-/// column; in its last place stands the norm of the residual.
+/// Equations in `WIDTH` − 1 unknowns, as the triangular factor of their QR decomposition. The last
+/// column is the right-hand side; its last element is the norm of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -31,7 +31,7 @@ impl<const WIDTH: usize> Default for LeastSquares<WIDTH> {
 }
 
 impl<const WIDTH: usize> LeastSquares<WIDTH> {
-    /// Rotates an equation in: the factors of the unknowns, the right-hand side behind them.
+    /// Adds an equation: the coefficients of the unknowns, then the right-hand side.
     pub(super) fn add(&mut self, mut equation: [f32; WIDTH]) {
         for (i, row) in self.rows.iter_mut().enumerate() {
             let (Some(&pivot), Some(&value)) = (row.get(i), equation.get(i)) else { return };
@@ -45,8 +45,8 @@ impl<const WIDTH: usize> LeastSquares<WIDTH> {
         }
     }
 
-    /// The unknowns, by back substitution; the place of the right-hand side stays zero. `None` when the equations leave
-    /// an unknown open.
+    /// The unknowns, by back substitution; the element of the right-hand side stays zero. `None` if
+    /// an unknown is not determined.
     pub(super) fn solve(&self) -> Option<[f32; WIDTH]> {
         let mut unknowns = [0.0; WIDTH];
         for (i, row) in self.rows.iter().enumerate().rev().skip(1) {
@@ -61,7 +61,7 @@ impl<const WIDTH: usize> LeastSquares<WIDTH> {
         Some(unknowns)
     }
 
-    /// Norm of what the best solution leaves of the right-hand sides.
+    /// Norm of the residual of the best solution.
     pub(super) fn residual(&self) -> f32 {
         self.rows.last().and_then(|row| row.last()).map_or(0.0, |norm| norm.abs())
     }
@@ -75,7 +75,7 @@ mod tests {
     const UNKNOWNS: usize = 9;
     const WIDTH: usize = UNKNOWNS + 1;
 
-    /// An equation with known factors, the solution 1, 2, … 9, and this error.
+    /// An equation with known coefficients, the solution 1, 2, … 9, and this error.
     fn equation(n: u16, error: f32) -> [f32; WIDTH] {
         let mut equation = [0.0; WIDTH];
         let mut sum = error;

@@ -1,11 +1,12 @@
-//! Level trim: how the inertial sensor is tilted in the airframe.
+//! Level trim: the tilt of the inertial sensor in the airframe.
 //!
-//! A sensor that is soldered two degrees askew makes a vehicle drift two degrees. Standing on a level floor, the airframe
-//! is level by definition, so the tilt that gravity shows then is the sensor's.
+//! A sensor soldered two degrees askew makes a vehicle drift with two degrees of tilt. On a level
+//! floor the airframe is level by definition, so the measured tilt is that of the sensor.
 //!
-//! Use it once a vehicle, on a floor you trust: its slope goes into the trim, and so does a bias of the accelerometer that
-//! [`SixPosition`](super::SixPosition) has not removed (0.17 m/s² is one degree). Not for a sensor mounted the wrong way
-//! round, which is a matter of the driver, and it says nothing about heading. The attitude of a still vehicle is
+//! Use it once per vehicle, on a floor known to be level: its slope enters the trim, and so does a
+//! bias of the accelerometer that [`SixPosition`](super::SixPosition) has not removed (0.17 m/s² is
+//! one degree). Not for a sensor mounted in another orientation, which the driver handles. Heading
+//! is not affected. For the attitude of a still vehicle use
 //! [`attitude_from_specific_force`](crate::attitude_from_specific_force).
 
 use super::{NotStill, StillAverage, StillnessConfig};
@@ -14,57 +15,58 @@ use crate::level::attitude_from_specific_force;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{GRAVITY, Instant, Vec3, math};
 
-/// Why there is no trim.
+/// Reason for which there is no trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LevelTrimRefusal {
-    /// It moves.
+    /// The vehicle moves.
     Moving(NotStill),
-    /// It is tilted by more than a mounting ever is.
+    /// The tilt is larger than any mounting error.
     Tilted {
-        /// By how much, rad.
+        /// Tilt, rad.
         tilt: f32,
     },
 }
 
-/// How good a trim is.
+/// Quality of a trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelTrimQuality {
-    /// Expected standard error of roll and pitch from the noise, rad.
+    /// Standard error of roll and pitch from the noise, rad.
     pub noise: f32,
-    /// Mean specific force above gravity, m/s². A vertical error of this size hints at a horizontal one.
+    /// Length of the mean specific force minus gravity, m/s². An accelerometer error of this size
+    /// may also be horizontal.
     pub force_error: f32,
     /// Samples averaged.
     pub samples: u32,
 }
 
-/// The tilt of the sensor against the airframe.
+/// Tilt of the sensor relative to the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trim {
-    /// The sensor is rolled by this against the airframe, rad.
+    /// Roll of the sensor relative to the airframe, rad.
     pub roll: f32,
-    /// The sensor is pitched by this against the airframe, rad.
+    /// Pitch of the sensor relative to the airframe, rad.
     pub pitch: f32,
-    /// Turns sensor into airframe.
+    /// Sensor → airframe.
     rotation: [[f32; 3]; 3],
 }
 
 impl Default for Trim {
-    /// A sensor that sits straight.
+    /// A sensor without tilt.
     fn default() -> Self {
         Self { roll: 0.0, pitch: 0.0, rotation: rotation_matrix([1.0, 0.0, 0.0, 0.0]) }
     }
 }
 
 impl Trim {
-    /// Of a sensor that is rolled and pitched so, rad.
+    /// From roll and pitch of the sensor, rad.
     pub(super) fn of(roll: f32, pitch: f32) -> Self {
         let ((sr, cr), (sp, cp)) = (math::sin_cos(0.5 * roll), math::sin_cos(0.5 * pitch));
         Self { roll, pitch, rotation: rotation_matrix([cr * cp, sr * cp, cr * sp, -sr * sp]) }
     }
 
-    /// The trim that makes this specific force point straight up. Straight for a force of zero.
+    /// The trim that makes this specific force point straight up. No trim for a force of zero.
     pub(super) fn levelling(force: &Vec3) -> Self {
         Self {
             roll: math::atan2(-force.y, -force.z),
@@ -73,15 +75,15 @@ impl Trim {
         }
     }
 
-    /// A vector in the axes of the airframe, body FRD: specific force, angular rate, and field if that sensor sits on the
-    /// same board.
+    /// Rotates a vector from the sensor to the airframe, body FRD: specific force, angular rate,
+    /// and field if the magnetometer is on the same board.
     #[inline]
     #[must_use]
     pub fn correct(&self, measured: Vec3) -> Vec3 {
         rotate(&self.rotation, &measured)
     }
 
-    /// A vector in the axes of the sensor, of one in the axes of the airframe.
+    /// Rotates a vector from the airframe to the sensor.
     #[inline]
     #[must_use]
     pub fn undo(&self, corrected: Vec3) -> Vec3 {
@@ -89,7 +91,7 @@ impl Trim {
     }
 }
 
-/// Finds the trim of a vehicle that stands on a level floor.
+/// Measures the trim of a vehicle that stands on a level floor.
 ///
 /// ```
 /// use stampfly_eskf::calibration::LevelTrim;
@@ -115,25 +117,25 @@ impl Default for LevelTrim {
 }
 
 impl LevelTrim {
-    /// Five degrees: more is a vehicle that does not stand level, not a crooked sensor.
+    /// Largest tilt by default, rad: five degrees. More is a vehicle that does not stand level.
     pub const TILT_MAX: f32 = 0.0873;
 
-    /// Nothing collected yet; accepts a tilt of up to `tilt_max`, rad.
+    /// Nothing collected yet; `tilt_max` is the largest accepted tilt, rad.
     #[must_use]
     pub fn new(still: StillnessConfig, tilt_max: f32) -> Self {
         Self { average: StillAverage::new(still), tilt_max }
     }
 
-    /// Share of the still stretch that has been collected, 0 to 1.
+    /// Collected share of the still stretch, 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f32 {
         self.average.progress()
     }
 
-    /// Takes an inertial sample. Gives the trim with the last sample of a still stretch; the next stretch gives it anew.
+    /// Takes an inertial sample. Returns the trim with the last sample of each still stretch.
     ///
     /// # Errors
-    /// Why the sample, or with its last sample the stretch, does not count.
+    /// The reason for which the sample, or with its last sample the stretch, is not used.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<(Trim, LevelTrimQuality)>, LevelTrimRefusal> {
         let Some(mean) = self.average.step(now, imu).map_err(LevelTrimRefusal::Moving)? else { return Ok(None) };
         let tilt = math::atan2(mean.accel.horizontal().norm(), -mean.accel.z);

@@ -1,19 +1,21 @@
-//! Calibration: what a sensor does wrong that can be found out on the ground.
+//! Calibration of sensors on the ground.
 //!
-//! | component | finds | the vehicle has to | result |
+//! | component | finds | the vehicle | result |
 //! |---|---|---|---|
-//! | [`StillCalibration`] | gyro bias, first attitude, ground altitude | lie still, after every power-on | [`CalibrationResult`] |
-//! | [`SixPosition`] | accelerometer scale and bias | lie on each of its six faces, once | [`AccelCorrection`] |
-//! | [`EllipsoidFit`] | magnetometer hard and soft iron | be turned all ways, once per place | [`MagCorrection`] |
-//! | [`LevelTrim`] | tilt of the sensor in the airframe | stand on a level floor, once | [`Trim`] |
-//! | [`TemperatureTable`] | bias against temperature | lie still while it warms up | [`TemperatureBias`] |
-//! | [`DriftFit`] | the same as a straight line | lie still while it warms up | [`Drift`] |
+//! | [`StillCalibration`] | gyro bias, attitude, ground altitude | lies still, each power-on | [`CalibrationResult`] |
+//! | [`SixPosition`] | accelerometer scale and bias | lies on each of six faces, once | [`AccelCorrection`] |
+//! | [`EllipsoidFit`] | magnetometer hard and soft iron | is turned all ways, once per place | [`MagCorrection`] |
+//! | [`LevelTrim`] | tilt of the sensor in the airframe | stands on a level floor, once | [`Trim`] |
+//! | [`TemperatureTable`] | bias against temperature | lies still while warming up | [`TemperatureBias`] |
+//! | [`DriftFit`] | the same as a straight line | lies still while warming up | [`Drift`] |
 //!
-//! All are plain data stepped with the time as an argument. A sample that is of no use is refused with the reason; a
-//! result comes with its quality, or not at all. Five of them listen to [`StillAverage`], so all mean the same by still.
+//! All are plain data, stepped with the time as an argument. An unusable sample is refused with the
+//! reason; a result comes with its quality or not at all. All but the ellipsoid use
+//! [`StillAverage`], so they share one definition of still.
 //!
-//! A [`CalibrationSession`] does all but the first as somebody asks for them, [`Corrections`] are what was found, and a [`Corrector`]
-//! applies it, in this order: temperature bias, accelerometer or magnetometer correction, trim.
+//! A [`CalibrationSession`] runs all but the first on request. [`Corrections`] hold the results,
+//! and a [`Corrector`] applies them in this order: drift with temperature, accelerometer or
+//! magnetometer correction, trim.
 //!
 //! [`CalibrationResult`]: stampfly_types::messages::CalibrationResult
 

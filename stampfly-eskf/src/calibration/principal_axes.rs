@@ -1,16 +1,17 @@
-//! The principal axes of a symmetric 3 × 3 matrix.
+//! Principal axes of a symmetric 3 × 3 matrix.
 
 use nalgebra::Matrix3;
 use stampfly_types::{Vec3, math};
 
-/// Eigenvectors, as columns, and eigenvalues of a symmetric matrix: Jacobi's rotations (Golub, Van Loan, 4th edition, section 8.5).
-/// Each rotates the first two axes and then passes the axes on, so no element is looked up by number.
+/// Eigenvectors, as columns, and eigenvalues of a symmetric matrix by Jacobi rotations (Golub, Van
+/// Loan, 4th edition, section 8.5). Each step rotates the first two axes and then permutes the
+/// axes, so no element is indexed.
 pub(super) fn principal_axes(mut matrix: Matrix3<f32>) -> (Matrix3<f32>, Vec3) {
     let pass_on = Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
     let mut axes = Matrix3::identity();
-    // Five times each pair; the error squares each time.
+    // Five sweeps over the three pairs; convergence is quadratic.
     for _ in 0..15 {
-        // By 45° at most, or the axes would change places for ever.
+        // At most 45°, otherwise the axes would be exchanged in every step.
         let (across, apart) = (2.0 * matrix.m12, matrix.m11 - matrix.m22);
         let angle = 0.5 * if apart < 0.0 { math::atan2(-across, -apart) } else { math::atan2(across, apart) };
         let (sin, cos) = math::sin_cos(angle);

@@ -1,10 +1,13 @@
-//! One calibration after the other, as somebody asks for them: which is under way, what to do next, and what came of it.
+//! Calibrations on request, one at a time, with progress, hints for the operator and the result.
 //!
-//! Give it every inertial and magnetic sample as it flies, with what [corrects](Corrections) them; it goes back to what was measured.
-//! The [report](CalibrationSession::report) says how far it is; whoever shows it to people puts the [hint](stampfly_types::messages::CalibrationHint) into words.
-//! What is found is for [`Corrections::accept`]. All calibrations share the memory of the largest, less than a kilobyte.
+//! Pass every inertial and magnetic sample, already corrected by the [`Corrections`] given; the
+//! session reverts the correction. The [report](CalibrationSession::report) holds progress and a
+//! [hint](stampfly_types::messages::CalibrationHint), which the user interface puts into words.
+//! Pass a finished report to [`Corrections::accept`]. All calibrations share the memory of the
+//! largest one, less than a kilobyte.
 //!
-//! Not for what is done after every power-on without being asked: [`StillCalibration`](super::StillCalibration).
+//! Not for the calibration after every power-on: that is
+//! [`StillCalibration`](super::StillCalibration).
 
 use super::{
     Corrections, DriftFit, DriftRefusal, EllipsoidConfig, EllipsoidFailure, EllipsoidFit, Face, LevelTrim,
@@ -15,20 +18,23 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Message, Vec3};
 
-/// Longest time between two steps forward: ten minutes. Warming up has longer ones than turning.
+/// Longest time without progress, ten minutes: warming up has longer pauses than turning.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// What the temperature has to move by, K: below it, the drift would be no better known than by nothing.
+/// Change of temperature required for a drift, K. With less its error would exceed the drift.
 const SPAN: f32 = 8.0;
-/// The largest drifts believed, rad/s and m/s² a kelvin: five times what the BMI270's data sheet gives (0.015 °/s and 0.25 mg).
+/// Largest plausible drifts, rad/s/K and m/s²/K: five times the data sheet of the BMI270 (0.015 °/s
+/// and 0.25 mg).
 const DRIFT_MAX: (f32, f32) = (1.3e-3, 1.25e-2);
-/// The largest error of a hold's length after six positions, m/s²: half a per cent, and it is no sensor at rest.
+/// Largest error of the holds' lengths after six positions, m/s²: half a per cent. More means that
+/// it was not at rest.
 const FORCE_RESIDUAL: f32 = 0.05;
-/// Between two looks whether the ellipsoid is good enough, samples.
+/// Number of magnetic samples between two attempts to solve the ellipsoid.
 const LOOK: u32 = 10;
-/// Turned by hand a vehicle sees more directions than by default are asked for.
+/// Samples, coverage and residual of the ellipsoid. Stricter than the defaults, because a vehicle
+/// turned by hand covers more directions.
 const ELLIPSOID: (u32, f32, f32) = (150, 0.85, 0.05);
 
-/// What is under way.
+/// The calibration in progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(clippy::large_enum_variant, reason = "there is one of them, for as long as the vehicle is on")]
@@ -41,7 +47,7 @@ enum Work {
     Temperature(DriftFit),
 }
 
-/// Calibrations as they are asked for.
+/// Runs calibrations on request.
 ///
 /// ```
 /// use stampfly_eskf::calibration::{CalibrationSession, Corrections};
@@ -64,15 +70,16 @@ pub struct CalibrationSession {
     work: Work,
     corrections: Corrections,
     report: CalibrationReport,
-    /// When it last came forward.
+    /// Time of the last progress.
     since: Instant,
-    /// The number of magnetic samples at the last look.
+    /// Number of magnetic samples at the last attempt.
     looked: u32,
-    /// A sum of what was last told.
+    /// Hash of the report that [`news`](Self::news) returned last.
     told: u32,
 }
 
-/// A number in place of a copy (FNV-1a, word by word): of two reports that differ it is the same with a chance of one in four milliards.
+/// Hash of a report, in place of a copy (FNV-1a, word by word). Two different reports collide once
+/// in 2³².
 fn sum(report: &CalibrationReport) -> u32 {
     report.to_words().iter().fold(0x811C_9DC5, |sum: u32, word| (sum ^ word).wrapping_mul(0x0100_0193))
 }
@@ -84,7 +91,7 @@ impl Default for CalibrationSession {
 }
 
 impl CalibrationSession {
-    /// Nothing is asked for yet; samples come with these corrections.
+    /// A session without a request. `corrections` are those applied to the samples.
     #[must_use]
     pub fn new(corrections: &Corrections) -> Self {
         let report = CalibrationReport::default();
@@ -92,7 +99,7 @@ impl CalibrationSession {
         Self { work: Work::Nothing, corrections: *corrections, report, since: Instant::ZERO, looked: 0, told }
     }
 
-    /// How far it is, and what was found.
+    /// Progress, hint and result.
     #[must_use]
     pub const fn report(&self) -> &CalibrationReport {
         &self.report
@@ -104,13 +111,14 @@ impl CalibrationSession {
         (sum != core::mem::replace(&mut self.told, sum)).then_some(self.report)
     }
 
-    /// Is one under way?
+    /// Whether a calibration is in progress.
     #[must_use]
     pub const fn is_running(&self) -> bool {
         !matches!(self.work, Work::Nothing)
     }
 
-    /// Begins a calibration, in place of the one that is under way. [`CalibrationKind::None`](Kind::None) ends that.
+    /// Starts a calibration and drops the one in progress. [`CalibrationKind::None`](Kind::None)
+    /// only drops it.
     pub fn request(&mut self, now: Instant, kind: Kind) {
         self.since = now;
         self.looked = 0;
@@ -129,7 +137,7 @@ impl CalibrationSession {
         self.report = CalibrationReport { kind, stage: Stage::Running, hint, ..CalibrationReport::default() };
     }
 
-    /// The vehicle was armed: what is under way ends.
+    /// Aborts the calibration in progress because the vehicle was armed.
     pub fn arm(&mut self) {
         self.end(Stage::Armed);
     }
@@ -174,7 +182,7 @@ impl CalibrationSession {
         let corrected = ImuData { accel: accel.correct(measured.accel), ..*measured };
         match level.step(now, &corrected) {
             Ok(None) => {
-                // Motion begins it again, and that is to be seen.
+                // Motion restarts the average, so the progress shown may decrease.
                 self.report.progress = level.progress();
                 if self.report.hint == Hint::Moving {
                     self.report.hint = Hint::Measuring;
@@ -198,7 +206,7 @@ impl CalibrationSession {
         let face = match calibration.step(now, measured) {
             Ok(Some(face)) => face,
             Ok(None) => {
-                // What was said of this hold stays until the vehicle is moved.
+                // A hint about this hold stays until the vehicle is moved.
                 if self.report.hint == Hint::Moving {
                     self.report.hint = Hint::Measuring;
                 }
@@ -219,7 +227,7 @@ impl CalibrationSession {
         self.report.faces |= 1 << face as u32;
         let faces = self.report.faces.count_ones();
         let solved = calibration.solve();
-        // Six holds and the seventh, which checks them.
+        // Six faces and a seventh hold that checks the result.
         self.forward(now, faces as f32 / (Face::ALL.len() + 1) as f32);
         match solved {
             Ok((correction, quality)) if quality.redundancy > 0 => {
@@ -258,7 +266,7 @@ impl CalibrationSession {
         let (span, found) = (fit.span(), fit.solve());
         self.forward(now, (span / SPAN).min(1.0));
         let (true, Some(found)) = (span >= SPAN, found) else { return };
-        // The samples were corrected by what was known before; what is found is the rest.
+        // The samples are already corrected by the known drift; the fit finds the rest.
         let known = self.corrections.drift;
         let (gyro, accel) = (known.gyro + found.gyro, known.accel + found.accel);
         if gyro.amax() > DRIFT_MAX.0 || accel.amax() > DRIFT_MAX.1 {
@@ -272,7 +280,7 @@ impl CalibrationSession {
     pub fn mag(&mut self, now: Instant, mag: &MagData) {
         let Work::Magnetometer(fit) = &mut self.work else { return };
         let Some(measured) = self.corrections.mag.undo(mag.field) else { return };
-        // A sample that is of no use is left out.
+        // Unusable samples are skipped.
         if fit.add(&measured).is_err() || fit.samples() < self.looked + LOOK {
             return;
         }

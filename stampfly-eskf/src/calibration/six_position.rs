@@ -1,14 +1,16 @@
-//! Accelerometer scale and bias from the six faces.
+//! Accelerometer scale and bias from six positions.
 //!
-//! The vehicle is put on each of its faces, in any order, and left alone for about two seconds each. Held still, an
-//! accelerometer measures one g whatever its attitude, so the scale and bias sought are those that give every hold the
-//! same length. That needs no exact placing: a face that leans by ten degrees is as good as an upright one.
+//! The vehicle lies on each of its faces, in any order, for about two seconds. At rest an
+//! accelerometer measures one g in any attitude; the scales and biases found give all holds that
+//! length. Exact placement is not needed: a face tilted by ten degrees is as good as an upright
+//! one.
 //!
-//! Use it once a vehicle, and after a crash. Not for cross-axis errors, which six faces do not show (data sheets give
-//! 0.5 % and less), and not with a temperature far from that of flight.
+//! Use it once per vehicle, and after a crash, at a temperature close to that of flight. Not for
+//! cross-axis errors, which six faces do not show (0.5 % and less by data sheets).
 //!
-//! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU
-//! calibration without external equipments", ICRA 2014, with three scales and three biases for unknowns.
+//! Method: Gauss-Newton on the lengths; D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to
+//! implement method for IMU calibration without external equipments", ICRA 2014, with three scales
+//! and three biases as unknowns.
 
 use super::least_squares::LeastSquares;
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
@@ -26,91 +28,92 @@ pub enum Face {
     Right,
     /// On its left side.
     Left,
-    /// On its feet.
+    /// On its landing gear.
     Bottom,
     /// On its back.
     Top,
 }
 
 impl Face {
-    /// All of them.
+    /// All faces.
     pub const ALL: [Self; 6] = [Self::Front, Self::Rear, Self::Right, Self::Left, Self::Bottom, Self::Top];
 
-    /// Cosine of 25°: more than that off, and it is no face.
+    /// Cosine of 25°, the largest tilt of a face.
     const UPRIGHT: f32 = 0.906;
 
-    /// The face that is down when this specific force is felt, body FRD; `None` when it leans by more than 25°.
+    /// The face that is down for this specific force, body FRD; `None` if it is tilted by more than
+    /// 25°.
     #[must_use]
     pub fn of(force: &Vec3) -> Option<Self> {
         let limit = Self::UPRIGHT * force.norm();
         let pairs = [(force.x, Self::Front, Self::Rear), (force.y, Self::Right, Self::Left)];
         let pairs = pairs.into_iter().chain([(force.z, Self::Bottom, Self::Top)]);
-        // The table pushes upwards, so it pushes against the axis that points down.
+        // The support pushes upwards, so the force is opposite to the axis that points down.
         let mut found = pairs.filter(|(along, ..)| along.abs() >= limit && limit > 0.0);
         found.next().map(|(along, down, up)| if along < 0.0 { down } else { up })
     }
 }
 
-/// Why a sample or a hold was not taken.
+/// Reason for which a sample or a hold was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SixPositionRefusal {
-    /// It moves.
+    /// The vehicle moves.
     Moving(NotStill),
     /// It turned slowly during the hold.
     Creeping,
-    /// It leans by more than 25° from the nearest face.
+    /// It is tilted by more than 25° from the nearest face.
     NotAFace,
-    /// This face was held before and had another length: one of the two holds was not at rest.
+    /// An earlier hold of this face had another length, so one of the two was not at rest.
     Contradiction(Face),
-    /// This face has been held twice already.
+    /// This face has two holds already.
     FaceFull(Face),
 }
 
-/// Why there is no result.
+/// Reason for which there is no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SixPositionFailure {
-    /// This face has not been held yet.
+    /// This face has no hold.
     Missing(Face),
     /// The holds do not determine scale and bias.
     NotSolvable,
-    /// A scale is off by more than a fifth or a bias above 3 m/s²: that is a fault, not a tolerance.
+    /// A scale error above a fifth or a bias above 3 m/s²: a fault, not a tolerance.
     Implausible,
 }
 
-/// How good a result is.
+/// Quality of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SixPositionQuality {
-    /// Root mean square of |a| − g over the holds as measured, m/s².
+    /// Root mean square of |a| − g over the holds, as measured, m/s².
     pub residual_before: f32,
-    /// The same after correction. Zero without meaning when `redundancy` is zero.
+    /// The same after correction. Without meaning while `redundancy` is zero.
     pub residual: f32,
-    /// Holds beyond the six that determine the result: hold faces a second time to have the result checked.
+    /// Number of holds beyond the six required. Hold a face a second time to check the result.
     pub redundancy: u32,
-    /// Expected standard error of a bias from the noise of the holds, m/s².
+    /// Standard error of a bias from the noise of the holds, m/s².
     pub noise: f32,
 }
 
-/// Corrects an accelerometer: (measured − bias) · scale.
+/// Accelerometer correction: (measured − bias) · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AccelCorrection {
-    /// What it shows without any force, body FRD, m/s².
+    /// Measurement without any force, body FRD, m/s².
     pub bias: Vec3,
-    /// What the rest has to be multiplied with, by axis.
+    /// Factor of each axis.
     pub scale: Vec3,
 }
 
 impl Default for AccelCorrection {
-    /// An accelerometer that is right.
+    /// No correction.
     fn default() -> Self {
         Self { bias: Vec3::zeros(), scale: Vec3::repeat(1.0) }
     }
 }
 
 impl AccelCorrection {
-    /// The specific force behind a measurement, body FRD, m/s².
+    /// The corrected specific force, body FRD, m/s².
     #[inline]
     #[must_use]
     pub fn correct(&self, measured: Vec3) -> Vec3 {
@@ -118,15 +121,16 @@ impl AccelCorrection {
     }
 }
 
-/// Holds kept of each face: one is needed, the second checks.
+/// Holds per face: one is required, the second checks it.
 const HOLDS: usize = 2;
-/// Two holds of a face may differ in length by this, m/s², and by this share of their distance, which is what a bias of
-/// 1 m/s² does to two holds that lean differently.
+/// Largest difference in length of two holds of a face: a constant, m/s², plus a share of their
+/// distance. The share is the effect of a bias of 1 m/s² on two holds of different tilt.
 const AGREEMENT: (f32, f32) = (0.1, 0.1);
-/// Largest standard deviation of the specific force in a hold, m/s². Above it, it turned too slowly to be called motion.
+/// Largest standard deviation of the specific force in a hold, m/s². More is a turn too slow to be
+/// detected as motion.
 const CREEP: f32 = 0.25;
 
-/// The six-position calibration of an accelerometer.
+/// Six-position calibration of an accelerometer.
 ///
 /// ```
 /// use stampfly_eskf::calibration::SixPosition;
@@ -138,7 +142,7 @@ const CREEP: f32 = 0.25;
 ///         let measured = force * 1.01 + Vec3::new(0.1, -0.2, 0.3);
 ///         for k in 0..1200 {
 ///             now += Duration::from_micros(2_500);
-///             // It is picked up and turned, then left alone.
+/// // It is picked up and turned, then left alone.
 ///             let gyro = if k < 100 { Vec3::new(3.0, 0.0, 0.0) } else { Vec3::zeros() };
 ///             let _ = calibration.step(now, &ImuData { accel: measured, gyro, temperature: 25.0, ..Default::default() });
 ///         }
@@ -152,14 +156,14 @@ const CREEP: f32 = 0.25;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SixPosition {
     average: StillAverage,
-    /// A hold has been taken, and nobody has touched the vehicle since.
+    /// A hold has been taken and the vehicle has not moved since.
     taken: bool,
     holds: [[Option<Vec3>; HOLDS]; 6],
     noise: f32,
 }
 
 impl Default for SixPosition {
-    /// Two thirds of a second to settle, a second and a quarter at 400 Hz to average, any accelerometer within a fifth of g.
+    /// 0.7 s to settle, 1.25 s at 400 Hz to average, an accelerometer within a fifth of g.
     fn default() -> Self {
         let limits = StillnessConfig { force_range: [7.8, 11.8], settle: 0.7, samples: 500, ..Default::default() };
         Self::new(limits)
@@ -167,16 +171,17 @@ impl Default for SixPosition {
 }
 
 impl SixPosition {
-    /// Nothing held yet. `force_range` must leave room for the errors that are looked for.
+    /// No holds yet. `force_range` must leave room for the errors to be found.
     #[must_use]
     pub fn new(still: StillnessConfig) -> Self {
         Self { average: StillAverage::new(still), taken: false, holds: [[None; HOLDS]; 6], noise: 0.0 }
     }
 
-    /// Takes an inertial sample. Gives the face when its hold has just been taken: now turn the vehicle.
+    /// Takes an inertial sample. Returns the face when its hold is complete: turn the vehicle now.
     ///
     /// # Errors
-    /// Why the sample, or with its last sample the hold, does not count. The holds taken before stay.
+    /// The reason for which the sample, or with its last sample the hold, is not used. Earlier
+    /// holds stay.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
@@ -210,7 +215,7 @@ impl SixPosition {
         Ok(face)
     }
 
-    /// Has this face been held?
+    /// Whether this face has a hold.
     #[must_use]
     pub fn has(&self, face: Face) -> bool {
         self.holds.get(face as usize).is_some_and(|holds| holds.iter().any(Option::is_some))
@@ -229,23 +234,24 @@ impl SixPosition {
         math::sqrt(squares.sum::<f32>() / (self.forces().count() as f32).max(1.0))
     }
 
-    /// Scale and bias of the accelerometer, and how well they fit.
+    /// Scale and bias of the accelerometer, with their quality.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason for which there is no result.
     pub fn solve(&self) -> Result<(AccelCorrection, SixPositionQuality), SixPositionFailure> {
         if let Some(missing) = Face::ALL.into_iter().find(|face| !self.has(*face)) {
             return Err(SixPositionFailure::Missing(missing));
         }
         let none = AccelCorrection::default();
         let mut correction = none;
-        // Converges to the last bit in four.
+        // Converges to the last bit within four iterations.
         for _ in 0..8 {
             let mut equations = LeastSquares::<7>::default();
             for measured in self.forces() {
                 let force = correction.correct(*measured);
                 let up = force / force.norm();
-                // |a| by scale, in g so that both kinds of unknowns have the same size, and by bias.
+                // Derivatives of |a|: by scale in g, so that both kinds of unknowns have a similar
+                // size, and by bias.
                 let by_scale = up.component_mul(&(measured - correction.bias)) / GRAVITY;
                 let by_bias = -up.component_mul(&correction.scale);
                 let short = GRAVITY - force.norm();
@@ -266,7 +272,7 @@ impl SixPosition {
             residual_before: self.residual(&none),
             residual,
             redundancy: (self.forces().count() as u32).saturating_sub(6),
-            // Two opposite faces share each bias.
+            // Two opposite faces determine each bias.
             noise: self.noise * core::f32::consts::FRAC_1_SQRT_2,
         };
         Ok((correction, quality))

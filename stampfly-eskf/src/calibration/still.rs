@@ -1,35 +1,35 @@
-//! Still-calibration: wait until nobody touches the vehicle, then average. After every power-on.
+//! Still calibration after every power-on: waits until the vehicle lies still, then averages.
 //!
-//! Gives the gyro's bias, the specific force that shows the first attitude, and the field and altitude to start from.
-//! What counts as still is [`StillAverage`]'s business.
+//! Finds the gyro bias, the specific force for the initial attitude, the magnetic field and the
+//! altitude. Stillness is defined by [`StillAverage`].
 //!
-//! Not for soft or hard iron, nor for accelerometer scale: those need the vehicle to be turned.
+//! Not for soft or hard iron, nor for accelerometer scale: those require the vehicle to be turned.
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::{BaroData, CalibrationResult, ImuData, MagData};
 use stampfly_types::{GRAVITY, Instant, Vec3};
 
-/// How good a finished still-calibration is.
+/// Quality of a completed still calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StillQuality {
-    /// Standard deviation of one sample of the gyro, rad/s.
+    /// Standard deviation of one gyro sample, rad/s.
     pub gyro_noise: Vec3,
-    /// Standard deviation of one sample of the accelerometer, m/s².
+    /// Standard deviation of one accelerometer sample, m/s².
     pub accel_noise: Vec3,
-    /// Mean specific force above gravity, m/s²: scale and bias of the accelerometer.
+    /// Length of the mean specific force minus gravity, m/s²: scale and bias of the accelerometer.
     pub force_error: f32,
-    /// Samples averaged.
+    /// Number of samples averaged.
     pub samples: u32,
 }
 
-/// The still-calibration.
+/// Still calibration.
 ///
 /// ```
 /// use stampfly_eskf::calibration::StillCalibration;
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut calibration = StillCalibration::default();
 /// for k in 0..1500 {
-///     // A sensor has noise: one that repeats itself does not measure, and never completes.
+/// // A sensor has noise. One that repeats a value is faulty, and the calibration never completes.
 ///     let noise = Vec3::repeat(if k % 2 == 0 { 1e-3 } else { -1e-3 });
 ///     let accel = Vec3::new(0.0, 0.0, -9.81) + noise;
 ///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0, ..Default::default() };
@@ -48,12 +48,12 @@ pub struct StillCalibration {
     altitude: Option<f32>,
     result: CalibrationResult,
     last: [f32; 6],
-    /// Samples running in which each axis repeated itself.
+    /// Number of consecutive repetitions of each axis.
     equal: [u32; 6],
 }
 
-/// An axis that repeats itself so often does not measure: 50 ms at 400 Hz. One axis repeats a sample by chance with a
-/// probability below 0.3, so often with 10⁻¹⁰.
+/// Repetitions after which an axis counts as frozen: 50 ms at 400 Hz. One axis repeats a sample by
+/// chance with a probability below 0.3, and this often with 10⁻¹⁰.
 const FROZEN: u32 = 20;
 
 impl StillCalibration {
@@ -63,11 +63,11 @@ impl StillCalibration {
         Self { average: StillAverage::new(config), ..Self::default() }
     }
 
-    /// Takes an inertial sample. After completion nothing changes any more.
+    /// Takes an inertial sample. Ignored after completion.
     ///
     /// # Errors
-    /// Why the sample does not count: the collection begins again, unless the sample was not finite. It never ends while
-    /// an axis repeats itself.
+    /// The reason for which the sample is not used. The collection restarts, except for a sample
+    /// that is not finite. It never completes while an axis is frozen.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<(), NotStill> {
         if self.result.complete {
             return Ok(());
@@ -94,7 +94,7 @@ impl StillCalibration {
         Ok(())
     }
 
-    /// Does an axis repeat itself?
+    /// Whether an axis repeats its value.
     fn is_frozen(&mut self, imu: &ImuData) -> bool {
         let values = imu.accel.iter().chain(imu.gyro.iter());
         for ((value, last), equal) in values.zip(&mut self.last).zip(&mut self.equal) {
@@ -104,7 +104,7 @@ impl StillCalibration {
         self.equal.iter().any(|equal| *equal >= FROZEN)
     }
 
-    /// Takes a magnetometer sample.
+    /// Takes a magnetometer sample into the running mean.
     pub fn add_mag(&mut self, mag: &MagData) {
         if mag.field.iter().all(|v| v.is_finite()) {
             let first = self.field == Vec3::zeros();
@@ -112,20 +112,20 @@ impl StillCalibration {
         }
     }
 
-    /// Takes a barometer sample.
+    /// Takes a barometer sample into the running mean.
     pub fn add_baro(&mut self, baro: &BaroData) {
         if baro.altitude.is_finite() {
             self.altitude = Some(self.altitude.map_or(baro.altitude, |a| a + 0.1 * (baro.altitude - a)));
         }
     }
 
-    /// What has been found so far.
+    /// The result so far.
     #[must_use]
     pub fn result(&self) -> CalibrationResult {
         self.result
     }
 
-    /// How good it is; `None` before completion.
+    /// Its quality; `None` before completion.
     #[must_use]
     pub fn quality(&self) -> Option<StillQuality> {
         self.mean.map(|mean| StillQuality {
@@ -141,7 +141,7 @@ impl StillCalibration {
 mod tests {
     use super::*;
 
-    /// With a noise of the smallest size.
+    /// With the smallest noise.
     fn still(k: u64) -> ImuData {
         let noise = Vec3::repeat(if k.is_multiple_of(2) { 1e-6 } else { -1e-6 });
         let accel = Vec3::new(0.1, 0.0, -9.8) + noise;
@@ -154,7 +154,7 @@ mod tests {
             |_| still(0),
             |k| ImuData { gyro: still(0).gyro, ..still(k) },
             |k| ImuData { accel: still(0).accel, ..still(k) },
-            // It dies half way through.
+            // It fails half-way.
             |k| still(k.min(900)),
         ];
         for sensor in stuck {
@@ -179,7 +179,7 @@ mod tests {
         }
         assert_eq!((calibration.result().progress, calibration.result().restarts), (0.0, 1));
         for k in 1020..4000u64 {
-            // The running means forget within a few tenths of a second.
+            // The running means forget within some tenths of a second.
             let _ = calibration.step(Instant::from_micros(2_500 * k), &still(k));
         }
         let result = calibration.result();

@@ -1,30 +1,31 @@
-//! Means over stretches in which nobody touched the vehicle.
+//! Means over stretches of time in which the vehicle lies still.
 //!
-//! A vehicle that calibrates in somebody's hand flips after take-off. So a mean only counts samples of a period in which
-//! the gyro and the accelerometer were quiet from beginning to end; any motion starts it again. Limits are the StampFly's
-//! (BMI270); the method is the exponentially weighted mean and variance.
+//! A bias averaged while the vehicle is held in a hand would make it flip after take-off. A mean
+//! therefore contains only samples of a period in which gyro and accelerometer were quiet
+//! throughout; any motion restarts it. Default limits are those of the StampFly (BMI270); the
+//! method is an exponentially weighted mean and variance.
 //!
-//! Use it to build a calibration that needs stillness. Not for deciding in flight whether the vehicle stands: a hover
-//! in calm air is as quiet as a table.
+//! Use it to build a calibration. Not for deciding in flight whether the vehicle stands: a hover in
+//! calm air is as quiet as a table.
 
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3, math};
 
-/// What counts as still.
+/// Definition of still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillnessConfig {
-    /// Largest mean angular rate, rad/s. Above the gyro's own offset, which may be 1 °/s an axis.
+    /// Largest mean angular rate, rad/s. Above the gyro's own bias, which may be 1 °/s per axis.
     pub rate_max: f32,
     /// Largest variance of the angular rate, (rad/s)².
     pub rate_variance_max: f32,
-    /// Mean specific force must lie between these, m/s².
+    /// Range of the mean specific force, m/s².
     pub force_range: [f32; 2],
     /// Largest variance of the specific force, (m/s²)².
     pub force_variance_max: f32,
     /// Time to settle before the average begins, s.
     pub settle: f32,
-    /// Samples averaged.
+    /// Number of samples in a mean.
     pub samples: u32,
 }
 
@@ -41,48 +42,49 @@ impl Default for StillnessConfig {
     }
 }
 
-/// Why a sample does not belong to a still stretch.
+/// Reason for which a sample does not belong to a still stretch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NotStill {
-    /// A number in it is not finite, or beyond what any sensor measures. It is left out and ends nothing.
+    /// A value is not finite, or beyond any sensor. The sample is skipped and the stretch
+    /// continues.
     NotFinite,
-    /// It turns: the mean angular rate is above the limit.
+    /// The mean angular rate is above the limit.
     Turning,
-    /// It trembles: the variance of the angular rate is above the limit.
+    /// The variance of the angular rate is above the limit.
     Trembling,
-    /// An axis repeats the same number: noise forbids that, so the sensor does not measure. Only [`StillCalibration`]
-    /// looks for it.
+    /// An axis repeats its value although a sensor has noise: the sensor is frozen. Tested by
+    /// [`StillCalibration`] only.
     ///
     /// [`StillCalibration`]: super::StillCalibration
     Frozen,
-    /// The mean specific force is not that of gravity.
+    /// The length of the mean specific force is outside `force_range`.
     NotGravity,
-    /// It is shaken: the variance of the specific force is above the limit.
+    /// The variance of the specific force is above the limit.
     Shaken,
 }
 
-/// The mean of a still stretch.
+/// Mean of a still stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StillMean {
-    /// Mean angular rate, which is the gyro's bias, body FRD, rad/s.
+    /// Mean angular rate, body FRD, rad/s: the gyro bias.
     pub gyro: Vec3,
     /// Mean specific force, body FRD, m/s².
     pub accel: Vec3,
-    /// Mean temperature of the sensor, °C, if every sample had one.
+    /// Mean temperature of the sensor, °C; `None` if a sample had none.
     pub temperature: Option<f32>,
-    /// Standard deviation of one sample of the gyro, rad/s.
+    /// Standard deviation of one gyro sample, rad/s.
     pub gyro_noise: Vec3,
-    /// Standard deviation of one sample of the accelerometer, m/s².
+    /// Standard deviation of one accelerometer sample, m/s².
     pub accel_noise: Vec3,
-    /// Samples in the mean.
+    /// Number of samples in the mean.
     pub samples: u32,
 }
 
 /// Weight of a new sample in the running mean and variance: about 50 ms at 400 Hz.
 const WEIGHT: f32 = 0.05;
-/// No sensor measures more, in any unit used here; its square is still far from infinity.
+/// Largest plausible value in any unit used here. Its square is far from overflow.
 const LARGEST: f32 = 1e6;
 
 /// Mean and variance with an exponential window.
@@ -101,8 +103,8 @@ impl Spread {
     }
 }
 
-/// Sums over one stretch. Squares are of the distance from the first value, because the difference of large squares is
-/// noise in `f32`.
+/// Sums over one stretch. Squares are relative to the first value: in `f32`, the difference of
+/// large squares would be noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
@@ -129,7 +131,7 @@ impl Sums {
     }
 }
 
-/// Averages still stretches of a fixed number of samples, one after the other.
+/// Averages consecutive still stretches of a fixed number of samples.
 ///
 /// ```
 /// use stampfly_eskf::calibration::{NotStill, StillAverage, StillnessConfig};
@@ -176,13 +178,13 @@ impl StillAverage {
         }
     }
 
-    /// What it was made with.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> StillnessConfig {
         self.config
     }
 
-    /// Share of the present stretch that has been collected, 0 to 1.
+    /// Collected share of the present stretch, 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f32 {
         self.count as f32 / self.config.samples.max(1) as f32
@@ -190,7 +192,7 @@ impl StillAverage {
 
     fn check(&self) -> Result<(), NotStill> {
         let [low, high] = self.config.force_range;
-        // A comparison with NaN must count as motion.
+        // Written so that NaN counts as motion.
         let checks = [
             (self.rate.mean.norm() <= self.config.rate_max, NotStill::Turning),
             (self.rate.variance <= self.config.rate_variance_max, NotStill::Trembling),
@@ -210,17 +212,18 @@ impl StillAverage {
         *self = Self { rate: self.rate, force: self.force, since: self.since, ..Self::new(self.config) };
     }
 
-    /// Takes an inertial sample, in order. Gives the mean with the last sample of a stretch; the next one begins with the
-    /// next sample, without settling again.
+    /// Takes an inertial sample, in order. Returns the mean with the last sample of a stretch. The
+    /// next stretch begins with the next sample, without settling.
     ///
     /// # Errors
-    /// What kind of motion it is. Unless the sample was not finite, the stretch begins again.
+    /// The kind of motion. The stretch restarts, except for a sample that is not finite.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<StillMean>, NotStill> {
         if !imu.accel.iter().chain(imu.gyro.iter()).all(|v| v.abs() <= LARGEST) {
             return Err(NotStill::NotFinite);
         }
         if self.since.is_none() {
-            // The first sample is the first mean; a variance counted from zero would be motion.
+            // Start the mean at the first sample: started at zero, the variance would look like
+            // motion.
             (self.rate.mean, self.force.mean) = (imu.gyro, imu.accel);
         }
         self.rate.add(&imu.gyro);

@@ -1,79 +1,83 @@
-//! Bias of gyro and accelerometer against temperature.
+//! Bias of gyro and accelerometer against temperature, as a table.
 //!
-//! A small vehicle's sensor warms up by tens of degrees between power-on and landing, and its bias moves with it. This
-//! table learns the curve while the vehicle lies still, over any number of warm-ups, and gives the bias for a temperature.
+//! The sensor of a small vehicle warms up by tens of degrees between power-on and landing, and its
+//! bias changes with the temperature. The table learns the curve while the vehicle lies still, over
+//! any number of warm-ups, and interpolates.
 //!
-//! Use it when the bias at power-on does not hold for a flight. The gyro's values are absolute; the accelerometer's are
-//! changes against the first stretch ever seen, because lying still shows a bias only together with gravity: take the
-//! absolute bias from [`SixPosition`](super::SixPosition) at the temperature where the table's accelerometer value is zero.
-//! Not a replacement for [`StillCalibration`](super::StillCalibration): bias also differs from one power-on to the next.
+//! Use it if the bias at power-on does not hold for a flight; for a straight line use
+//! [`DriftFit`](super::DriftFit). Gyro values are absolute. Accelerometer values are changes
+//! relative to the first stretch, because at rest the bias cannot be separated from gravity: take
+//! the absolute bias from [`SixPosition`](super::SixPosition) at the temperature at which the
+//! table's accelerometer value is zero. Not a replacement for
+//! [`StillCalibration`](super::StillCalibration): the bias also differs from one power-on to the
+//! next.
 
 use super::{NotStill, StillAverage, StillMean, StillnessConfig};
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3, math};
 
-/// Coldest temperature of the table, °C.
+/// Lowest temperature of the table, °C.
 const COLDEST: f32 = -10.0;
 /// Width of a bin, °C.
 const WIDTH: f32 = 5.0;
-/// Bins: up to 85 °C.
+/// Number of bins: up to 85 °C.
 const BINS: usize = 19;
-/// Two bins must be this far apart to show a slope, °C.
+/// Smallest distance of two bins for a slope, °C.
 const SLOPE: f32 = 0.5 * WIDTH;
 
-/// Why a sample or a stretch was not taken.
+/// Reason for which a sample or a stretch was not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TemperatureRefusal {
-    /// It moves.
+    /// The vehicle moves.
     Moving(NotStill),
-    /// The sensor gave no temperature.
+    /// The sensor has no temperature.
     NoTemperature,
     /// Outside −10 to 85 °C.
     OutOfRange {
         /// Mean of the stretch, °C.
         temperature: f32,
     },
-    /// It was moved since the last stretch, and the table does not reach this temperature yet, so the change of the
-    /// accelerometer's bias cannot be told from the change of attitude.
+    /// The vehicle was moved since the last stretch and the table does not cover this temperature,
+    /// so that a change of the accelerometer bias cannot be separated from the change of attitude.
     Moved,
 }
 
-/// Whether the table knows the temperature that was asked for.
+/// Whether the table covers a temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coverage {
-    /// Between two temperatures it has seen.
+    /// Between two temperatures with data.
     Inside,
-    /// Outside by up to one bin of 5 °C: the outermost slope is continued.
+    /// Outside by up to one bin of 5 °C: extrapolated with the outermost slope.
     Beside,
-    /// Farther outside: the value one bin outside, not more.
+    /// Farther outside: the value one bin outside.
     Clamped,
 }
 
-/// A bias out of the table.
+/// A bias from the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemperatureBias {
     /// Bias of the gyro, body FRD, rad/s.
     pub gyro: Vec3,
     /// Change of the accelerometer's bias, body FRD, m/s².
     pub accel: Vec3,
-    /// How far the table can be trusted with it.
+    /// Coverage of the temperature.
     pub coverage: Coverage,
-    /// Still samples behind it: of the poorer of the two bins used.
+    /// Still samples of the bin used, or of the poorer of the two.
     pub samples: u32,
 }
 
-/// How good the table is.
+/// Quality of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemperatureQuality {
-    /// Bins with data.
+    /// Number of bins with data.
     pub filled: u32,
-    /// Coldest and warmest temperature seen, °C.
+    /// Lowest and highest temperature with data, °C.
     pub span: [f32; 2],
-    /// Root mean square of what a stretch's gyro mean differs from its bin's, any axis, rad/s: noise, the slope within a
-    /// bin, and what changes from one power-on to the next.
+    /// Root mean square difference of a stretch's gyro mean from that of its bin, any axis, rad/s:
+    /// noise, the slope within a bin, and changes from one power-on to the next.
     pub gyro_scatter: f32,
-    /// Still samples in all bins.
+    /// Number of still samples in all bins.
     pub samples: u32,
 }
 
@@ -86,7 +90,7 @@ struct Bin {
     temperature: f32,
     gyro: Vec3,
     accel: Vec3,
-    /// Sum of squared distances of the stretches' gyro means from their mean.
+    /// Sum of squared distances of the gyro means from their mean.
     gyro_squares: f32,
 }
 
@@ -103,7 +107,7 @@ impl Bin {
     }
 }
 
-/// The table. Plain data: keep it over power-offs, and feed it after each power-on.
+/// The table. Plain data: store it over power-offs and continue it after each power-on.
 ///
 /// ```
 /// use stampfly_eskf::calibration::{Coverage, TemperatureTable};
@@ -125,12 +129,12 @@ pub struct TemperatureTable {
     average: StillAverage,
     bins: [Bin; BINS],
     span: [f32; 2],
-    /// Specific force in the present attitude at the temperature where the accelerometer's values are zero.
+    /// Specific force in the present attitude at the temperature with accelerometer value zero.
     anchor: Option<Vec3>,
 }
 
 impl Default for TemperatureTable {
-    /// A stretch is one second at 400 Hz, in which the temperature is as good as constant.
+    /// A stretch is one second at 400 Hz, in which the temperature is practically constant.
     fn default() -> Self {
         Self::new(StillnessConfig { samples: 400, ..Default::default() })
     }
@@ -144,10 +148,11 @@ impl TemperatureTable {
         Self { average: StillAverage::new(still), bins: [Bin::default(); BINS], span, anchor: None }
     }
 
-    /// Takes an inertial sample with its temperature. True when a stretch has just gone into the table.
+    /// Takes an inertial sample with its temperature. Returns true when a stretch has been added to
+    /// the table.
     ///
     /// # Errors
-    /// Why the sample, or with its last sample the stretch, does not count.
+    /// The reason for which the sample, or with its last sample the stretch, is not used.
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<bool, TemperatureRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
@@ -161,7 +166,7 @@ impl TemperatureTable {
         }
     }
 
-    /// Call it at power-on with a table that was kept: the vehicle may lie differently now.
+    /// Prepares a stored table after power-on: the vehicle may lie in another attitude.
     pub fn begin(&mut self) {
         *self = Self { bins: self.bins, span: self.span, ..Self::new(self.average.config()) };
     }
@@ -191,8 +196,8 @@ impl TemperatureTable {
         self.bins.iter().filter(|bin| bin.stretches > 0)
     }
 
-    /// The bias at a temperature, °C: straight lines between the bins' means. `None` for an empty table or a temperature
-    /// that is not finite.
+    /// The bias at a temperature, °C, interpolated linearly between the bins' means. `None` for an
+    /// empty table or a temperature that is not finite.
     #[must_use]
     pub fn bias(&self, temperature: f32) -> Option<TemperatureBias> {
         let (coldest, warmest) = (self.filled().next()?, self.filled().next_back()?);
@@ -206,7 +211,8 @@ impl TemperatureTable {
             _ => Coverage::Clamped,
         };
         let temperature = temperature.max(low - WIDTH).min(high + WIDTH);
-        // The two bins around it; outside, the outermost and the nearest that is far enough for a slope.
+        // The two bins around it; outside, the outermost bin and the nearest one at least `SLOPE`
+        // away.
         let (a, b) = if temperature < coldest.temperature {
             (coldest, self.filled().find(|bin| bin.temperature >= coldest.temperature + SLOPE).unwrap_or(coldest))
         } else if temperature > warmest.temperature {
@@ -228,7 +234,7 @@ impl TemperatureTable {
         })
     }
 
-    /// How good the table is; `None` when it is empty.
+    /// Quality of the table; `None` if it is empty.
     #[must_use]
     pub fn quality(&self) -> Option<TemperatureQuality> {
         self.filled().next()?;

@@ -1,20 +1,23 @@
-//! Airspeeds: while a receiver shows the velocity they show the wind, and then the wind shows the velocity.
+//! Airspeed updates: they estimate the wind while a receiver measures the velocity, and the
+//! velocity afterwards.
 //!
-//! Both ways the error of the other estimate is the same in many samples, so neither is known better by them than the other is.
+//! In both directions the error of the other estimate is common to many samples. The update
+//! therefore never makes one of them more certain than the other.
 
 use super::gate::Sensor;
 use super::wander::limited;
 use super::*;
 use crate::aid::airspeed::{Wind, along_nose};
 
-/// A velocity from outside older than this shows no wind.
+/// After this time without an external velocity, airspeeds correct the velocity instead of the
+/// wind.
 const SILENT: Duration = Duration::from_millis(2_000);
-/// The nose must point at least so level that it has a direction.
+/// Smallest horizontal component of the nose direction; a steeper nose has no usable heading.
 const LEVEL_NOSE: f32 = 0.5;
 
 impl Eskf {
-    /// While a velocity from outside is younger than two seconds it only teaches the wind; then it holds the velocity, and with it the
-    /// outputs valid, no better than the wind is known.
+    /// While an external velocity is younger than two seconds, updates only the wind. Afterwards
+    /// updates the velocity and keeps the outputs valid, no more certain than the wind.
     pub(super) fn update_airspeed(
         &mut self,
         at: Instant,
@@ -41,7 +44,9 @@ impl Eskf {
             let off = (row.predicted - speed) / level;
             let [north, east] = wind.velocity();
             let along = nose[0] * north + nose[1] * east;
-            // A tube that shows too much does so in every sample: taken for noise, its error would be a wind from aside as soon as the nose moves a little.
+            // A scale error of the tube is the same in every sample. Treated as white noise, it
+            // would become a false crosswind as soon as the nose turns a little. So one direction
+            // of the nose teaches at most one sample.
             let doubt = variance + known;
             wind.learn(0.0, nose, along + off, limited(wind.variance_along(nose), doubt, doubt));
             return Ok(Fusion::Fused { ratio: 0.0 });
@@ -52,6 +57,7 @@ impl Eskf {
             return Ok(Fusion::Gated { ratio });
         }
         self.aided(&[true, true, false]);
+        // The wind's error is common to all samples: bound what they can add up to.
         let variance = limited(known, variance, wind.variance_along(nose));
         let innovation = self.innovation(delayed, [row], [speed], [variance]);
         Ok(self.update(&innovation, ratio))

@@ -1,58 +1,62 @@
-//! Which way is north? Found from how the receiver's velocity changes, when nothing else tells the heading.
+//! Heading from the velocity changes of a receiver, for a start without any heading.
 //!
-//! A filter that starts without a heading carries attitude and velocity in a world that is turned about the vertical by an
-//! unknown angle ψ. What the inertial sensor feels as a change p of the velocity in that world, the receiver measures as a
-//! change w in the true one: w = R(ψ)·p. From many windows of time ψ is the angle that fits best (Kabsch, "A solution for the
-//! best rotation to relate two sets of vectors", Acta Cryst. A32, 1976, in two dimensions):
+//! A filter that starts without a heading carries attitude and velocity in a world frame rotated
+//! about the vertical by an unknown angle ψ. The inertial sensor measures a velocity change p in
+//! that frame, the receiver the same change w in the true frame: w = R(ψ)·p. ψ is the least-squares
+//! rotation over many time windows (Kabsch, "A solution for the best rotation to relate two sets of
+//! vectors", Acta Cryst. A32, 1976, in two dimensions):
 //!
-//! ψ = atan2(Σ p×w, Σ p·w), with the means of p and w taken out.
+//! ψ = atan2(Σ p×w, Σ p·w), with the means of p and w subtracted.
 //!
-//! The means go because a wrong tilt adds the same change to every window: on a circle, or a start and a stop, the motion does
-//! not. The residual of the fit is the noise that the angle's standard deviation follows from, so that a vehicle that only
-//! stands never finds a heading.
+//! The means are subtracted because a tilt error adds the same change to every window; motion on a
+//! circle, or a start and a stop, does not. The residual of the fit gives the standard deviation of
+//! the angle, so a vehicle that stands never finds a heading.
 //!
 //! | | condition |
 //! |---|---|
 //! | start | [`StartHeading::Unknown`](crate::StartHeading::Unknown), or `Magnetic` without a field |
-//! | a window | the first velocity at least [`WINDOW`] after the last window's |
-//! | found | [`LEAST`] windows, a standard deviation below [`KNOWN`] |
-//! | stop | found, or an attitude from outside |
+//! | window | from one velocity to the first one at least [`WINDOW`] later |
+//! | found | [`LEAST`] windows and a standard deviation below [`KNOWN`] |
+//! | stop | found, or an external attitude |
 //!
-//! Not for a heading that a compass knows. A start on a moving vehicle is not found wrong, but later: its tilt is wrong first.
+//! Not for a vehicle with a usable magnetometer. A start on a moving vehicle gives a wrong tilt,
+//! which delays the result.
 
 use stampfly_types::{Instant, math};
 
-/// Shortest window, s: at 1 m/s² it changes the velocity by what a receiver is wrong by several times.
+/// Shortest window, s. At 1 m/s² the velocity changes by several times the error of a receiver.
 const WINDOW: f32 = 0.5;
-/// Longest window, s: after a gap it begins anew.
+/// Longest window, s. A longer gap starts a new window.
 const GAP: f32 = 3.0;
-/// Windows that are needed: two for the means, and the rest for a residual.
+/// Smallest number of windows: two for the means, the others for the residual.
 const LEAST: f32 = 6.0;
-/// Standard deviation at which the heading is found, rad. The filter is linear about it and finds the rest.
+/// Standard deviation at which the heading counts as found, rad. The filter is linear within it and
+/// corrects the rest.
 const KNOWN: f32 = 0.1;
-/// After so many windows the old ones count half: gyro and tilt drift.
+/// Number of windows after which the sums are halved, because gyro and tilt drift.
 const MEMORY: f32 = 120.0;
 
-/// What a velocity showed.
+/// Result of one velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Step {
-    /// Nothing yet.
+    /// The window has not ended.
     Waits,
-    /// A window has ended: the next one begins at this velocity.
+    /// The window has ended. The next one starts at this velocity.
     Window,
-    /// The estimated world must turn by `turn` about the vertical to be the true one; rad, with its standard deviation.
+    /// The estimated world frame must be rotated by `turn` about the vertical, rad, with standard
+    /// deviation `sigma`.
     Found { turn: f32, sigma: f32 },
 }
 
-/// The search for north.
+/// State of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Alignment {
     sought: bool,
-    /// When the window began, and the receiver's velocity then.
+    /// Start of the window and the receiver's velocity at that time.
     began: Option<(Instant, [f32; 2])>,
     windows: f32,
-    /// Sums of p, of w, of p·w and p×w, of p² and w².
+    /// Sums of p, of w, of (p·w, p×w) and of (p², w²).
     felt: [f32; 2],
     measured: [f32; 2],
     products: [f32; 2],
@@ -60,7 +64,7 @@ pub(super) struct Alignment {
 }
 
 impl Alignment {
-    /// North is known.
+    /// Heading known, no search.
     pub(super) const KNOWN: Self = Self {
         sought: false,
         began: None,
@@ -71,7 +75,7 @@ impl Alignment {
         squares: [0.0; 2],
     };
 
-    /// North is to be found.
+    /// Heading unknown, search active.
     pub(super) const SOUGHT: Self = Self { sought: true, ..Self::KNOWN };
 
     pub(super) const fn is_sought(&self) -> bool {
@@ -82,8 +86,9 @@ impl Alignment {
         *self = Self::KNOWN;
     }
 
-    /// Takes the receiver's velocity and the estimated one of the same instant, each along two axes of its world, m/s, and the
-    /// variance of the receiver's along one. After [`Step::Window`] the estimated velocity must be set to the receiver's.
+    /// Processes the estimated and the measured horizontal velocity of one instant, m/s, with the
+    /// variance of one axis of the measured one. After [`Step::Window`] the caller must set the
+    /// estimated velocity to the measured one.
     pub(super) fn step(&mut self, at: Instant, felt: [f32; 2], measured: [f32; 2], variance: f32) -> Step {
         let Some((began, first)) = self.began else {
             self.began = Some((at, measured));
@@ -125,7 +130,8 @@ impl Alignment {
         let felt = self.squares[0] - dot(self.felt, self.felt) / n;
         let measured = self.squares[1] - dot(self.measured, self.measured) / n;
         let fit = math::sqrt(along * along + across * across);
-        // Per axis and window; two means and an angle are taken out of it. No less than two velocities are wrong by.
+        // Per axis and window; two means and an angle have been fitted. At least the variance of
+        // two velocities.
         let residual = (felt + measured - 2.0 * fit) / (2.0 * n - 5.0);
         let sigma = math::sqrt(residual.max(2.0 * variance) / felt.max(1e-6));
         if sigma < KNOWN && fit.is_finite() {
@@ -148,15 +154,16 @@ fn cross([ax, ay]: [f32; 2], [bx, by]: [f32; 2]) -> f32 {
 mod tests {
     use super::*;
 
-    /// A vehicle on a circle with this acceleration, whose estimated world is turned by `turn` and tilted so that it feels
-    /// `tilt` m/s² too much: what is found, and after how many seconds.
+    /// A vehicle on a circle with this acceleration, whose estimated world is rotated by `turn` and
+    /// tilted such that it measures `tilt` m/s² too much. Returns angle, standard deviation and
+    /// time in seconds.
     fn search(acceleration: f32, turn: f32, tilt: f32) -> Option<(f32, f32, u16)> {
         let mut alignment = Alignment::SOUGHT;
         let mut felt = [0.0; 2];
         let mut last = [0.0; 2];
         for n in 0..600u16 {
             let time = 0.2 * f32::from(n);
-            // 0.3 rad/s round the circle; noise that is no sine of it.
+            // 0.3 rad/s on the circle; the noise has other frequencies.
             let speed = acceleration / 0.3;
             let noise = |k: f32| 0.14 * math::sin(k * f32::from(n) * 2.4 + k);
             let truth = [speed * math::cos(0.3 * time), speed * math::sin(0.3 * time)];

@@ -1,34 +1,37 @@
-//! Garbage among the inertial samples: a shifted frame, a register of `0x8000`, spikes.
+//! Bridges corrupt inertial samples: shifted frames, registers of `0x8000`, spikes.
 //!
-//! A sample that [`ImuData::is_garbled`] recognises is replaced by the last one that was believed.
-//! What goes on is no glitch: the fourth sample running is believed if it follows from the one
-//! before it as a body moves, and the first after 50 ms whatever it is: for so long a vehicle flies
-//! on with its last rates. Spikes that happen to come together do not follow from each other.
-//! Integrating one such sample costs more than standing in for it: 8 g for 2.5 ms are 0.2 m/s and
-//! the tilt of 2000 °/s is 5°.
+//! A sample that [`ImuData::is_garbled`] flags is replaced by the last accepted one. Persistent
+//! data is not a glitch: from the fourth consecutive flagged sample on, samples are used if they
+//! follow from each other as a body moves. The twenty-first flagged sample (50 ms at 400 Hz) is
+//! used in any case, because a vehicle can fly that long on its last rates but no longer. Unrelated
+//! spikes do not follow from each other and stay bridged until then.
+//!
+//! Integrating one corrupt sample costs more than replacing it: 8 g for 2.5 ms are 0.2 m/s, and
+//! 2000 °/s are 5° of tilt.
 
 use crate::config::EskfConfig;
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Instant, Vec3};
 
-/// Garbled samples running that are bridged: of those that follow from each other, and of any.
+/// Largest numbers of consecutive flagged samples that are bridged: consistent with each other, and
+/// any.
 const FOLLOWING: u32 = 3;
 const LONGEST: u32 = 20;
 
-/// The last sample that was believed, and the garbled ones since.
+/// The last accepted sample and the flagged ones since.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Bridge {
     last: Option<(Instant, ImuData)>,
-    /// Rate of the last garbled sample.
+    /// Rate of the last flagged sample, rad/s.
     garbled: Vec3,
-    /// Garbled samples running, and how many of them follow from each other.
+    /// Consecutive flagged samples, and how many of them are consistent with each other.
     bridged: u32,
     following: u32,
 }
 
 impl Bridge {
-    /// What to use in place of a finite sample; `None` for the sample itself.
+    /// The replacement of a finite sample; `None` if the sample itself is to be used.
     pub(super) fn step(&mut self, config: &EskfConfig, at: Instant, imu: &ImuData) -> Option<ImuData> {
         let garbled = |elapsed, rate: Vec3| {
             imu.is_garbled(Some((elapsed, rate)), config.angular_acceleration, config.accel_full_scale)
@@ -41,7 +44,8 @@ impl Bridge {
                 self.bridged += 1;
                 self.garbled = imu.gyro;
                 if self.following <= FOLLOWING && self.bridged <= LONGEST {
-                    // As if it had been measured now: what is allowed to the next sample does not grow with a burst.
+                    // Restamped: otherwise the rate change allowed to the next sample would grow
+                    // with the burst.
                     self.last = Some((at, before));
                     return Some(before);
                 }
@@ -57,7 +61,8 @@ impl Bridge {
 mod tests {
     use super::*;
 
-    /// Samples of a body at rest, with these rates about x and y at the end; how many of them were believed.
+    /// Number of accepted samples among the last ones, which have these rates about x and y after a
+    /// rest.
     fn believed(rates: &[[f32; 2]]) -> usize {
         let (config, mut bridge) = (EskfConfig::default(), Bridge::default());
         let still = [[0.0; 2]; 8];
@@ -81,7 +86,7 @@ mod tests {
 
     #[test]
     fn nothing_is_bridged_for_longer_than_50_ms() {
-        // None of them follows from the one before, nor any from the first that is believed.
+        // No sample follows from the one before, nor from the first accepted one.
         let others = [[-20.0, 0.0], [0.0, 20.0], [0.0, -20.0]];
         let noise: [[f32; 2]; 42] = core::array::from_fn(|n| if n == 20 { [20.0, 0.0] } else { others[n % 3] });
         assert_eq!([20, 21, 42].map(|samples| believed(&noise[..samples])), [0, 1, 2]);

@@ -1,7 +1,8 @@
-//! What others measure: position, velocity and attitude from outside, and sensors with a model of the user's.
+//! External measurements: position, velocity, attitude, and sensors with a user's model.
 //!
-//! Each axis has its own standard deviation; one with an infinite deviation, or one of a thousand kilometres, was not measured. For the sensors that the
-//! filter knows by itself see [`measurements`](super::measurements).
+//! Each axis has its own standard deviation. An axis with an infinite one, or one of at least a
+//! thousand kilometres, was not measured. For on-board sensors see
+//! [`measurements`](super::measurements).
 
 use super::alignment::Step;
 use super::gate::{GateResult, Sensor};
@@ -10,22 +11,27 @@ use super::wander::limited;
 use super::*;
 use crate::measurements::Aiding;
 
-/// Smallest variances that are believed: of a velocity, (m/s)², and of a position, m².
+/// Smallest variances accepted: of a velocity, (m/s)², and of a position, m².
 const LEAST_VELOCITY: f32 = 1e-6;
 const LEAST_POSITION: f32 = 1e-8;
-/// Variance of a position that says nothing yet, m²: a kilometre. The first fix is the position then.
+/// Position variance above which the position counts as unknown, m²: a kilometre. The first fix
+/// then sets it.
 const NOWHERE: f32 = 1e6;
 
-/// An axis with this standard deviation, m or m/s, or an infinite one, was not measured. Squares of larger ones overflow.
+/// An axis with at least this standard deviation, m or m/s, was not measured. Squares of larger
+/// ones overflow.
 const NOT_MEASURED: f32 = 1e6;
 
-/// Farther than this no vehicle is and flies, and no single measurement moves a position, m, a velocity, m/s, an attitude, rad, and the biases of gyro and accelerometer, rad/s and m/s².
+/// Plausibility limits per state: position m, velocity m/s, attitude rad, gyro bias rad/s,
+/// accelerometer bias m/s². They bound absolute measurements of position and velocity, and the
+/// correction by one measurement.
 const FARTHEST: [f32; N] = [1e7, 1e7, 1e7, 1e4, 1e4, 1e4, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 100.0, 100.0, 100.0];
 
-/// Share of a claim that is taken back with each fix when the receiver's error turns out to wander.
+/// Share of an excessive position certainty that each fix takes back when the receiver's error
+/// proves to be constant.
 const TAKEN_BACK: f32 = 0.1;
 
-/// A vector of the world with axes that may be missing, beside what was predicted.
+/// A world vector whose axes may be missing, with its prediction.
 struct Axes {
     rows: [Row; 3],
     measured: [f32; 3],
@@ -34,7 +40,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// An axis that is not given is predicted exactly and tells nothing.
+    /// An axis that is not given has a zero Jacobian and a zero innovation.
     fn new(mut rows: [Row; 3], values: &Vec3, sigma: &Vec3, least: f32) -> Self {
         let mut axes = Self { rows, measured: (*values).into(), variances: [1.0; 3], given: [true; 3] };
         for axis in 0..3 {
@@ -50,7 +56,7 @@ impl Axes {
         axes
     }
 
-    /// Is this no position or velocity of any vehicle?
+    /// Whether a component exceeds what any vehicle reaches.
     fn are_beyond(&self, farthest: f32) -> bool {
         self.measured.iter().any(|value| value.abs() > farthest)
     }
@@ -59,7 +65,7 @@ impl Axes {
         self.given.iter().filter(|given| **given).count()
     }
 
-    /// Leaves the horizontal axes out.
+    /// Removes the horizontal axes.
     fn drop_level(&mut self) {
         for axis in 0..2 {
             self.given[axis] = false;
@@ -70,12 +76,13 @@ impl Axes {
     }
 }
 
-/// Was an axis with this standard deviation not measured?
+/// Whether an axis with this standard deviation was not measured.
 const fn says_nothing(sigma: f32) -> bool {
     sigma.abs() >= NOT_MEASURED
 }
 
-/// Finite where it counts: every axis that is given, and no deviation that is no number.
+/// The values to check for NaN and infinity: axes that were not measured count as zero, and a NaN
+/// standard deviation makes its axis NaN.
 fn is_given(values: &Vec3, sigma: &Vec3) -> [f32; 3] {
     let given = |value: f32, sigma: f32| match sigma {
         _ if sigma.is_nan() => f32::NAN,
@@ -135,7 +142,8 @@ impl Eskf {
         }
         let first = core::array::from_fn::<_, 3, _>(|axis| axes.given[axis] && self.is_nowhere(axis));
         if !self.is_north_known() || first.contains(&true) {
-            // Without a heading the inertial sensor does not carry the position from fix to fix.
+            // Without a heading the inertial sensor cannot propagate the position from fix to fix:
+            // set it at each fix.
             let placed =
                 core::array::from_fn(|axis| first[axis] || (axis < 2 && axes.given[axis] && !self.is_north_known()));
             self.place(delayed, &axes, placed);
@@ -177,7 +185,7 @@ impl Eskf {
         }
     }
 
-    /// Updates with a position whose error may stay the same from fix to fix.
+    /// Updates with a position whose error may be constant from fix to fix.
     fn update_wandering(&mut self, at: Instant, delayed: &DelayedState, axes: &Axes, ratio: f32) -> Fusion {
         let follows =
             self.wander.fix(at, core::array::from_fn(|axis| axes.measured[axis] - delayed.state.position[axis]));
@@ -186,7 +194,8 @@ impl Eskf {
             let floor = if follows { self.wander.floor(axis, *variance) } else { 0.0 };
             let prior = self.covariance.get(POSITION + axis, POSITION + axis);
             *variance = limited(prior, *variance, floor);
-            // It was taken for white before enough fixes had shown that it is not.
+            // The first fixes were treated as white noise, before their differences showed
+            // otherwise: take back the certainty gained from them.
             self.covariance.inflate(POSITION + axis, TAKEN_BACK * (floor - prior).max(0.0));
         }
         let before = self.state.position;
@@ -196,12 +205,12 @@ impl Eskf {
         fusion
     }
 
-    /// May the position along this axis be anywhere?
+    /// Whether the position along this axis is unknown.
     pub(super) fn is_nowhere(&self, axis: usize) -> bool {
         self.covariance.get(POSITION + axis, POSITION + axis) > NOWHERE
     }
 
-    /// Moves the position to a measured one along these axes.
+    /// Sets the position to a measured one along these axes.
     fn place(&mut self, delayed: &DelayedState, axes: &Axes, along: [bool; 3]) {
         let jump = Vec3::from(axes.measured) - delayed.state.position;
         for axis in 0..3 {
@@ -211,7 +220,7 @@ impl Eskf {
             }
         }
         if along[2] {
-            // The surface did not move relative to the vehicle.
+            // The surface moves with the vehicle: the height above it has not changed.
             self.surface = self.surface.map(|surface| surface + jump.z);
         }
     }
@@ -220,7 +229,7 @@ impl Eskf {
         self.gates.test(sensor, self.now, ratio, self.config.external_lockout, self.config.lockout_samples)
     }
 
-    /// Position or velocity along these axes has been measured from outside.
+    /// Records an external measurement of position or velocity along these axes.
     pub(super) fn aided(&mut self, [north, east, down]: &[bool; 3]) {
         if *north || *east {
             self.gates.accept(Sensor::Level, self.now);
@@ -230,7 +239,7 @@ impl Eskf {
         }
     }
 
-    /// Shows a horizontal velocity to who looks for north.
+    /// Passes a horizontal velocity to the heading search.
     fn align(&mut self, at: Instant, delayed: &DelayedState, axes: &Axes) {
         self.gates.accept(Sensor::Velocity, self.now);
         self.gates.accept(Sensor::Level, self.now);
@@ -260,7 +269,7 @@ impl Eskf {
         let [w, x, y, z] = attitude.wxyz();
         let age = self.admit(Sensor::Attitude, at, &[w, x, y, z, sigma])?;
         if !(0.9..=1.1).contains(&attitude.norm_squared()) {
-            // Whoever makes one without a check may make one that is no rotation.
+            // An unchecked quaternion may not have unit length.
             return Err(Refusal::Implausible);
         }
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
@@ -287,19 +296,23 @@ impl Eskf {
         }
     }
 
-    /// Uses a measurement with a model of one's own.
+    /// Fuses a measurement with a user's model.
     ///
-    /// `model` is asked for the state at `at`, which may be late as far as the [`horizon`](EskfConfig::horizon), and gives for
-    /// each axis what the sensor should read in that state, and how that changes with the fifteen
-    /// [errors](crate::filter): position (0–2) and velocity (3–5) in the world, attitude (6–8) as a small rotation of the
-    /// body, gyro bias (9–11), accelerometer bias (12–14). `variances` are those of the noise of each axis, in the squared
-    /// unit of the measurement, positive and independent. `gate` is in standard deviations; infinite lets all pass.
+    /// `model` receives the state at `at`, which may be as late as the
+    /// [`horizon`](EskfConfig::horizon). It returns, for each axis, the predicted reading in that
+    /// state and its derivatives by the fifteen [errors](crate::filter): position (0–2) and
+    /// velocity (3–5) in the world, attitude (6–8) as a small rotation of the body, gyro bias
+    /// (9–11), accelerometer bias (12–14). `variances` are the noise variances of the axes in the
+    /// squared unit of the measurement, positive and independent. `gate` is in standard deviations;
+    /// infinity accepts everything.
     ///
-    /// A gated measurement is left out and never resets the state: the filter does not know which part of it is wrong. There
-    /// is no check for repeated stamps, because many sensors may share this door. While the heading is not known, all that
-    /// hangs on it is refused as [`Refusal::Missing`]: any horizontal position or velocity.
+    /// A rejected measurement is left out and never resets the state: the filter does not know
+    /// which part of it is wrong. Repeated time stamps are accepted, because several sensors may
+    /// share this function. While the heading is unknown, models that depend on horizontal position
+    /// or velocity are refused as [`Refusal::Missing`].
     ///
-    /// Wheel speed, and the range to a beacon; for an airspeed see [`fuse_airspeed`](Estimator::fuse_airspeed):
+    /// Example: wheel speed and the range to a beacon. For an airspeed see
+    /// [`fuse_airspeed`](Estimator::fuse_airspeed).
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, StartHeading, aid::{Row, velocity}, filter::{NominalState, POSITION}};
@@ -316,10 +329,10 @@ impl Eskf {
     ///     if k % 10 != 0 {
     ///         continue;
     ///     }
-    ///     // A wheel, m/s: the first component of the velocity in the body, and the side does not slip.
+    /// // A wheel, m/s: the velocity along body x, and no sideways slip along y.
     ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
     ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
-    ///     // A range to a beacon, m, a fifth of a second late.
+    /// // A range to a beacon, m, a fifth of a second late.
     ///     let range = |state: &NominalState| {
     ///         let away = state.position - beacon;
     ///         let distance = away.norm().max(0.1);
@@ -330,13 +343,14 @@ impl Eskf {
     ///         assert!(eskf.fuse(Instant::from_micros(k * 5_000 - 200_000), range, [48.0], [0.25], 5.0).is_fused());
     ///     }
     /// }
-    /// // Two metres nearer to the beacon than where it thought it was.
+    /// // The position has moved two metres towards the beacon.
     /// assert!(((eskf.estimate().position - beacon).norm() - 48.0).abs() < 0.3);
     /// ```
     ///
     /// # Errors
-    /// The answer says [`Fusion::Refused`] before the start, when the state of that time is no longer known or not yet, and
-    /// when a number is not finite or a variance not positive.
+    /// Returns [`Fusion::Refused`] before initialisation, for a time outside the history or too far
+    /// ahead, for values that are not finite, for variances that are not positive, and for
+    /// corrections beyond any vehicle.
     pub fn fuse<const M: usize>(
         &mut self,
         at: Instant,
@@ -371,9 +385,9 @@ impl Eskf {
         }
         let innovation = self.innovation(delayed, rows, measured, variances);
         let ratio = innovation.nis() / (gate * gate * EskfConfig::axes_factor(M));
-        // No number is not below the gate either.
+        // Written so that a NaN ratio is rejected.
         if ratio <= 1.0 {
-            // A gate that lets all pass lets that pass, too.
+            // An infinite gate accepts any innovation, so bound the correction itself.
             let moves = innovation.correction();
             if !moves.iter().zip(FARTHEST).all(|(moves, most)| moves.abs() < most) {
                 return Err(Refusal::Implausible);
@@ -385,10 +399,10 @@ impl Eskf {
         }
     }
 
-    /// The vehicle stands still at `at`: its velocity is zero with this standard deviation along each axis, m/s. For what knows
-    /// it from elsewhere: wheels that do not turn, a closed clamp. It may stand beside a receiver's late velocities.
-    ///
-    /// While the heading is not known it holds the vertical velocity only.
+    /// Zero-velocity update at `at`, with the standard deviation of each axis, m/s. For a caller
+    /// that knows from another source that the vehicle stands: wheels that do not turn, a closed
+    /// clamp. Valid together with late velocities of a receiver. While the heading is unknown it
+    /// constrains the vertical velocity only.
     pub fn fuse_zero_velocity(&mut self, at: Instant, sigma: f32) -> Fusion {
         let variance = sigma * sigma;
         let gate = self.config.gate;

@@ -1,7 +1,8 @@
-//! Turns that move the picture faster than the camera follows.
+//! Detects rotation faster than the flow camera can track.
 //!
-//! Above [`flow_max_rate`](crate::EskfConfig::flow_max_rate) its readings are wrong by metres per
-//! second, until the vehicle hardly turns any more. Meanwhile the tilt rests on the gyro alone.
+//! Above [`flow_max_rate`](crate::EskfConfig::flow_max_rate) flow readings are wrong by metres per
+//! second, until the vehicle has nearly stopped turning. In that time the tilt depends on the gyro
+//! alone.
 
 use stampfly_types::math;
 
@@ -9,30 +10,30 @@ use stampfly_types::math;
 const CALM: f32 = 1.0;
 const SETTLES: f32 = 0.1;
 
-/// How the body turns.
+/// Phase of a rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Turn {
-    /// The picture shows its motion.
+    /// Slow enough for the camera.
     Slow,
-    /// Faster than the camera follows, or it was a moment ago: the reading says nothing.
+    /// Too fast, or too fast within the last `SETTLES`: the reading is unusable.
     Fast,
-    /// No longer: it has turned by this angle, rad.
+    /// Just ended. The body has turned by this angle, rad.
     Over(f32),
 }
 
-/// What is remembered of a fast turn.
+/// State of the detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct FastTurn {
-    /// How long it has to turn slowly yet, s.
+    /// Time for which the body must still turn slowly, s.
     settles: f32,
-    /// How far it has turned, rad.
+    /// Angle turned so far, rad.
     turned: f32,
 }
 
 impl FastTurn {
-    /// Takes the rates about body x and y, rad/s, over the interval of a reading, s. A fast turn begins
-    /// at the rate `fastest`.
+    /// Takes the rates about body x and y, rad/s, over the interval of a reading, s. A fast turn
+    /// begins above the rate `fastest`, rad/s.
     #[inline]
     pub(super) fn step(&mut self, [x, y]: [f32; 2], interval: f32, fastest: f32) -> Turn {
         let square = x * x + y * y;
@@ -57,7 +58,7 @@ mod tests {
         let mut turn = FastTurn::default();
         assert_eq!(turn.step([5.0, 3.0], 0.01, 7.0), Turn::Slow);
         assert!((0..50).all(|_| turn.step([12.0, 0.0], 0.01, 7.0) == Turn::Fast));
-        // It brakes: slower than the camera follows, and not yet calm.
+        // Braking: within the camera's range, but not yet calm.
         assert_eq!(turn.step([3.0, 0.0], 0.01, 7.0), Turn::Fast);
         let calm = (0..20).map(|_| turn.step([0.1, 0.0], 0.01, 7.0)).find(|turn| *turn != Turn::Fast);
         let Some(Turn::Over(angle)) = calm else { panic!("{calm:?}") };

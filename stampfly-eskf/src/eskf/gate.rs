@@ -1,26 +1,28 @@
-//! Innovation gates: which sensor was fused lately, which has been locked out, and how often the state was reset.
+//! Innovation gates: recent acceptance, lock-out and reset counter of each sensor.
 //!
-//! A measurement with a test ratio above one is rejected. That is right for an outlier and wrong for a filter that has
-//! diverged: its gates would reject the very sensors that could correct it. So the state is reset to a sensor that has
-//! been rejected for longer than [`lockout`](crate::EskfConfig::lockout), and several times running, and many resets in a row report divergence.
+//! A measurement with a test ratio above one is rejected. That is right for an outlier and wrong
+//! for a diverged filter, whose gates would reject the sensors that could correct it. The state is
+//! therefore reset to a sensor that has been rejected for longer than
+//! [`lockout`](crate::EskfConfig::lockout), and for several samples in sequence. Many resets in
+//! sequence report divergence.
 //!
-//! | of any sensor | condition |
+//! | each sensor | condition |
 //! |---|---|
-//! | start | its first measurement with a test ratio of at most one |
-//! | continue ([`Gates::is_recent`]) | the last accepted measurement is less than a second old |
-//! | stop | a second without an accepted measurement |
-//! | reset ([`GateResult::Reset`]) | every measurement rejected for longer than `lockout`, and at least `lockout_samples` of them |
-//! | divergence ([`Gates::count_reset`]) | eight resets, each within 1.5 s of the one before |
+//! | start | first measurement with a test ratio of at most one |
+//! | continue ([`Gates::is_recent`]) | last accepted measurement less than a second old |
+//! | stop | one second without an accepted measurement |
+//! | reset ([`GateResult::Reset`]) | all rejected for longer than `lockout`, at least `lockout_samples` |
+//! | divergence ([`Gates::count_reset`]) | eight resets, each within 1.5 s of the last |
 
 use stampfly_types::{Duration, Instant};
 
-/// A sensor counts as active this long after its last accepted measurement.
+/// Time after the last accepted measurement for which a sensor counts as active.
 const AIDING_TIMEOUT: Duration = Duration::from_micros(1_000_000);
-/// So many resets, each within [`RESET_INTERVAL`] of the one before, mean divergence.
+/// Number of resets, each within [`RESET_INTERVAL`] of the one before, that means divergence.
 const MAX_RESETS: u32 = 8;
 const RESET_INTERVAL: Duration = Duration::from_micros(1_500_000);
 
-/// The measurements that are gated, each by itself.
+/// Measurements with a gate of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sensor {
     Tof,
@@ -31,7 +33,8 @@ pub(super) enum Sensor {
     Velocity,
     Position,
     Attitude,
-    /// Anything from outside that shows the horizontal position or velocity, and the vertical one.
+    /// Any external measurement of horizontal position or velocity (`Level`), and of the vertical
+    /// ones (`Down`).
     Level,
     Down,
 }
@@ -43,24 +46,24 @@ const SENSORS: usize = Sensor::Down as usize + 1;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct SensorRecord {
-    /// Stamp of its newest measurement.
+    /// Time stamp of the newest measurement.
     stamp: Option<Instant>,
-    /// When one was last accepted.
+    /// Time of the last accepted measurement.
     fused: Option<Instant>,
-    /// Since when every one has been rejected.
+    /// Start of the present series of rejections.
     gated_since: Option<Instant>,
-    /// How many.
+    /// Length of that series.
     gated: u16,
 }
 
-/// What the gate decides about a measurement.
+/// Decision of a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GateResult {
-    /// Update with it.
+    /// Fuse it.
     Fuse,
     /// Reject it.
     Reject,
-    /// The sensor has been locked out: reset the state to it.
+    /// The lock-out time is over: reset the state to this sensor.
     Reset,
 }
 
@@ -80,7 +83,7 @@ impl Gates {
         &mut self.records[sensor as usize]
     }
 
-    /// Is this stamp newer than the sensor's last one? Remembers it.
+    /// Whether the stamp is newer than the sensor's last one, which it then replaces.
     #[inline]
     pub(super) fn is_new(&mut self, sensor: Sensor, stamp: Instant) -> bool {
         let record = self.record(sensor);
@@ -91,19 +94,20 @@ impl Gates {
         new
     }
 
-    /// Has one of its measurements been accepted within the last second?
+    /// Whether a measurement has been accepted within the last second.
     #[inline]
     pub(super) fn is_recent(&self, sensor: Sensor, now: Instant) -> bool {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < AIDING_TIMEOUT)
     }
 
-    /// Has one of its measurements been accepted within this time?
+    /// Whether a measurement has been accepted within this time.
     #[inline]
     pub(super) fn is_recent_within(&self, sensor: Sensor, now: Instant, within: Duration) -> bool {
         self.records[sensor as usize].fused.is_some_and(|at| now.since(at) < within)
     }
 
-    /// Tests a measurement's ratio against its gate, with a lock-out time in seconds and how many rejected ones it takes.
+    /// Tests a ratio against the gate. `lockout` is in seconds, `samples` the number of rejections
+    /// a reset requires.
     #[inline(always)]
     pub(super) fn test(&mut self, sensor: Sensor, now: Instant, ratio: f32, lockout: f32, samples: u16) -> GateResult {
         let record = self.record(sensor);
@@ -126,25 +130,25 @@ impl Gates {
         record.gated = 0;
     }
 
-    /// Was its last measurement rejected?
+    /// Whether the last measurement was rejected.
     pub(super) fn is_rejected(&self, sensor: Sensor) -> bool {
         self.records[sensor as usize].gated_since.is_some()
     }
 
-    /// Restarts the lock-out time of a sensor, after an inflation that should let it pass.
+    /// Restarts the lock-out time after an inflation that should let the sensor pass.
     pub(super) fn restart_lockout(&mut self, sensor: Sensor, now: Instant) {
         let record = self.record(sensor);
         record.gated_since = Some(now);
         record.gated = 0;
     }
 
-    /// Records a reset of the state to a sensor. True when the resets mean divergence.
+    /// Records a reset of the state to this sensor. Returns true if the filter has diverged.
     pub(super) fn record_reset(&mut self, sensor: Sensor, now: Instant) -> bool {
         self.accept(sensor, now);
         self.count_reset(now)
     }
 
-    /// Counts a reset or an inflation. True when there were too many in a row: divergence.
+    /// Counts a reset or an inflation. Returns true for too many in sequence: divergence.
     pub(super) fn count_reset(&mut self, now: Instant) -> bool {
         self.resets = if now.since(self.last_reset) > RESET_INTERVAL { 1 } else { self.resets.saturating_add(1) };
         self.last_reset = now;
@@ -166,7 +170,7 @@ mod tests {
             assert_eq!(gates.test(Sensor::Tof, at(millis), 9.0, 0.2, 1), GateResult::Reject, "{millis}");
         }
         assert_eq!(gates.test(Sensor::Tof, at(1_301), 9.0, 0.2, 1), GateResult::Reset);
-        // One that fits in between starts the count anew.
+        // An accepted measurement in between restarts the count.
         gates.test(Sensor::Tof, at(1_310), 0.1, 0.2, 1);
         assert_eq!(gates.test(Sensor::Tof, at(1_600), 9.0, 0.2, 1), GateResult::Reject);
     }

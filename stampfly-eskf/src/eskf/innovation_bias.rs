@@ -1,18 +1,19 @@
-//! Monitor of the mean innovation: a mean that is not zero shows a filter whose covariance is too small.
+//! Tests the mean of the flow innovations: a mean that is not zero indicates a covariance that is
+//! too small.
 //!
-//! A gate tests single innovations. A gyro bias far beyond its standard deviation never reaches the gate: the tilt it
-//! makes settles where flow corrects as fast as the bias tilts, with every innovation within its standard deviation and
-//! all of one sign. The innovations of a consistent filter are white (Mehra, "On the identification of variances and
-//! adaptive Kalman filtering", IEEE TAC 15(2), 1970), so their mean over some time is near zero; a mean that is not
-//! asks for an inflation of the states behind it.
+//! A gate tests single innovations. A gyro bias far beyond its standard deviation never reaches it:
+//! the tilt settles where flow corrects as fast as the bias tilts, with every innovation inside the
+//! gate and all of one sign. The innovations of a consistent filter are white (Mehra, "On the
+//! identification of variances and adaptive Kalman filtering", IEEE TAC 15(2), 1970), so their mean
+//! is near zero. A biased mean requires inflation of the states that cause it.
 
 /// Time constant of the mean, s.
 const TIME_CONSTANT: f32 = 0.3;
-/// Mean, in standard deviations of one innovation, beyond which it counts as biased: five times its own deviation at
+/// Largest mean, in standard deviations of one innovation: five standard deviations of the mean at
 /// 100 Hz.
 const MAX_MEAN: f32 = 0.8;
 
-/// Mean of a sensor's whitened innovations.
+/// Running mean of a sensor's whitened innovations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct InnovationBiasMonitor {
@@ -20,12 +21,13 @@ pub(super) struct InnovationBiasMonitor {
 }
 
 impl InnovationBiasMonitor {
-    /// Adds the whitened innovations of a measurement over `dt` seconds. True when the mean is biased; it then starts
-    /// again from zero.
+    /// Adds the whitened innovations of a measurement over `dt` seconds. Returns true if the mean
+    /// is biased, and then restarts from zero.
     pub(super) fn update(&mut self, innovations: &[f32; 2], dt: f32) -> bool {
         let share = dt / (TIME_CONSTANT + dt);
         for (mean, innovation) in self.mean.iter_mut().zip(innovations) {
-            // Outliers are left to the gate.
+            // Clamped, so that a single outlier cannot bias the mean; outliers are left to the
+            // gate.
             *mean += (innovation.clamp(-3.0, 3.0) - *mean) * share;
         }
         let [x, y] = self.mean;

@@ -1,17 +1,18 @@
-//! The filter as an [`Estimator`]: initialise, command, predict, estimate.
+//! [`Estimator`] of the filter: initialise, command, predict, estimate.
 
 use super::gate::Sensor;
 use super::unfelt::{UNFELT_NOISE, unfelt};
 use super::*;
 use crate::aid::airspeed::Wind;
 
-/// A specific force, m/s², or rate, rad/s, beyond this is no measurement: a thousand g is more than any inertial sensor of a vehicle
-/// measures. The squares of much larger ones overflow, and make a covariance that is no number.
+/// Largest specific force, m/s², or rate, rad/s, accepted: a thousand g is beyond any inertial
+/// sensor. Squares of much larger values overflow and make the covariance NaN.
 const LARGEST: f32 = 1.0e4;
 
-/// A heading with this standard deviation, rad, is any heading: that of all round, π/√3, and more.
+/// Standard deviation, rad, from which a heading counts as unknown. A uniform distribution has
+/// π/√3.
 const UNKNOWN_HEADING: f32 = 1.5;
-/// A heading that is known worse than this, rad, is not valid: 20°.
+/// Largest standard deviation of a valid heading, rad: 20°.
 const CERTAIN_HEADING: f32 = 0.35;
 
 impl Estimator for Eskf {
@@ -20,13 +21,15 @@ impl Estimator for Eskf {
         if !is_usable(&calibration.gyro_bias) || !is_usable(&calibration.specific_force) {
             return;
         }
-        // Assigning field by field would miss one; a whole one beside this one would be a second estimator on the
-        // stack.
+        // `Self::new` is inlined and writes in place: a second estimator would not fit on the
+        // stack, and assigning single fields could miss one.
         let (command, findings, tallies) = (self.command, self.findings, self.tallies);
         *self = Self::new(self.config);
         self.now = at;
         self.initialized = true;
         self.calibration = *calibration;
+        // The command and the findings describe the vehicle, not the estimate: they survive a
+        // restart.
         (self.command, self.findings) = (command, findings);
         self.tallies = tallies;
         self.state.gyro_bias = calibration.gyro_bias;
@@ -59,6 +62,7 @@ impl Estimator for Eskf {
             }
             self.state.position = Vec3::zeros();
             self.state.velocity = Vec3::zeros();
+            // The new origin is known exactly by definition.
             for axis in 0..3 {
                 self.covariance.reset(POSITION + axis, self.config.initial_position * self.config.initial_position);
                 self.covariance.reset(VELOCITY + axis, self.config.initial_velocity * self.config.initial_velocity);
@@ -71,11 +75,13 @@ impl Estimator for Eskf {
         match (command.on_ground, self.anchor) {
             (true, None) => self.anchor = Some(self.state.position),
             (false, Some(anchor)) => {
-                // Blind on the ground: the surface is one clearance below.
+                // The range sensor may have had no reading on the ground: the surface is then one
+                // clearance below.
                 self.surface.get_or_insert(anchor.z + self.config.ground_clearance);
                 self.anchor = None;
                 self.stood = Some(self.now);
                 let vibration = self.config.vibration_bias;
+                // The starting propellers shake the accelerometer and change the air pressure.
                 self.covariance.inflate(ACCEL_BIAS + 2, vibration * vibration);
                 if let Some(offset) = &mut self.baro_offset {
                     offset.inflate(self.config.baro_wash * self.config.baro_wash);
@@ -85,10 +91,11 @@ impl Estimator for Eskf {
         }
     }
 
-    // Inlined into the loop over the samples, it would compute seventy addresses before the loop: 140 instructions.
+    // Not inlined: in the loop over the samples the compiler would compute seventy addresses in
+    // advance, 140 instructions.
     #[inline(never)]
     fn predict(&mut self, at: Instant, imu: &ImuData) {
-        // No number is not below it either.
+        // Written so that NaN is refused, too.
         let usable = imu.accel.norm_squared() < LARGEST * LARGEST && imu.gyro.norm_squared() < LARGEST * LARGEST;
         let dt = at.since(self.now).seconds();
         if !usable {
@@ -136,7 +143,7 @@ impl Estimator for Eskf {
         self.force = motion.force;
         self.accels.add(&imu.accel);
         self.steps = self.steps.wrapping_add(1);
-        // Half way between two updates with gravity, so that no step does both.
+        // Half-way between two gravity updates, so that no step does both.
         if let Some(anchor) = self.anchor
             && self.steps % PSEUDO_MEASUREMENT_DIVIDER == PSEUDO_MEASUREMENT_DIVIDER / 2
         {
@@ -149,7 +156,8 @@ impl Estimator for Eskf {
         }
         if self.config.gravity_use == GravityUse::Always && self.anchor.is_none() && !self.command.accel_faulty {
             self.felt.add(&imu.accel);
-            // The mean of the samples since the covariance was last propagated says what each of them does.
+            // One update with the mean has the information of the single samples at a fraction of
+            // the cost.
             if due && let Some((accel, count)) = self.felt.take() {
                 let sigma = self.config.gravity_sigma / math::sqrt(count);
                 self.update_gravity(accel, &self.acceleration.at(at), sigma);
@@ -187,8 +195,9 @@ impl Estimator for Eskf {
         self.tallied(Aiding::Velocity, fusion)
     }
 
-    /// While a velocity from outside is younger than two seconds an airspeed only teaches the wind; then it holds the velocity, and with it
-    /// the outputs valid, no better than the wind is known. It is counted as [`Aiding::Own`].
+    /// While an external velocity is younger than two seconds, an airspeed only updates the wind.
+    /// Afterwards it corrects the velocity and keeps the outputs valid, no more certain than the
+    /// wind. Counted as [`Aiding::Own`].
     ///
     /// ```
     /// use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal, aid::airspeed::Wind};
@@ -198,8 +207,8 @@ impl Estimator for Eskf {
     /// assert_eq!(fusion, Fusion::Refused(Refusal::NotInitialized));
     /// ```
     ///
-    /// It is refused before the start, while north is not known, for a nose that points up or down, and when the sample is too old or no
-    /// number.
+    /// Refused before initialisation, while the heading is unknown, for a steep nose, and for
+    /// samples that are too old or not finite.
     fn fuse_airspeed(&mut self, at: Instant, speed: f32, sigma: f32, wind: &mut Wind) -> Fusion {
         let fusion = self.update_airspeed(at, speed, sigma, wind).unwrap_or_else(Fusion::Refused);
         self.tallied(Aiding::Own, fusion)
@@ -221,7 +230,7 @@ impl Estimator for Eskf {
         let sound = self.initialized && !self.status.diverged;
         let down = self.is_aided_outside(Sensor::Down);
         let [range, air] = [self.is_range_aided(), recent(Sensor::Baro)];
-        // Not what aids from inside: an airspeed, a model of wheels.
+        // `EXTERNAL` excludes aiding from on board: an airspeed, a model of wheels.
         let outside = [Sensor::Position, Sensor::Velocity, Sensor::Attitude].into_iter().any(recent);
         let north = self.is_north_known();
         let horizontal = sound && north && (self.is_velocity_aided() || self.has_just_risen());
@@ -274,13 +283,13 @@ impl Estimator for Eskf {
 }
 
 impl Eskf {
-    /// Heading at the start and its standard deviation, rad, and none where the nose defines north. Sets the field that the
-    /// magnetometer is compared with, and whether north has to be found.
+    /// Initial heading and its standard deviation, rad; `None` where the nose defines north. Also
+    /// sets the reference field of the magnetometer.
     fn start_heading(&mut self) -> Option<(f32, f32)> {
         let seen = self.field;
         if self.config.start_heading != StartHeading::Nose {
             self.field = match (self.config.earth_field, seen) {
-                // Magnetic north, and the inclination that was seen.
+                // Magnetic north, with the inclination of the calibration.
                 (None, Some(seen)) => Some(Vec3::new(math::sqrt(seen.x * seen.x + seen.y * seen.y), 0.0, seen.z)),
                 (given, _) => given.filter(|field| field.norm() > 0.0).map(|field| field.normalize()),
             };
@@ -291,7 +300,7 @@ impl Eskf {
                 Some((heading, sigma))
             }
             StartHeading::Magnetic if self.config.mag_enable => match (seen, self.field) {
-                // The nose is as far from the field it saw as from the earth's.
+                // The angle between the measured field and the earth's field is the heading.
                 (Some(seen), Some(earth)) => {
                     let heading = math::atan2(earth.y, earth.x) - math::atan2(seen.y, seen.x);
                     Some((heading, self.config.mag_sigma))
@@ -302,7 +311,7 @@ impl Eskf {
         }
     }
 
-    /// Turns the attitude, whose heading is zero, to this one.
+    /// Rotates the attitude, whose heading is zero, to this heading, or starts the search for it.
     fn set_start_heading(&mut self, heading: f32, sigma: f32) {
         if sigma >= UNKNOWN_HEADING {
             self.alignment = Alignment::SOUGHT;
@@ -316,7 +325,8 @@ impl Eskf {
         }
     }
 
-    /// Is the heading known well enough to be used? The nose's north is known by definition.
+    /// Whether the heading is certain enough to be valid. With [`StartHeading::Nose`] it is exact
+    /// by definition.
     fn is_heading_certain(&self) -> bool {
         if self.config.start_heading == StartHeading::Nose {
             return true;

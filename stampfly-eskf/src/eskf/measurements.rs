@@ -1,5 +1,8 @@
-//! One update a sensor: time alignment, innovation, gate, then update, rejection, or reset after a lock-out. The
-//! models, and the conditions of each sensor, are in [`aid`](crate::aid).
+//! Updates with on-board sensors: range, flow, barometer, magnetometer.
+//!
+//! Each one refuses unusable samples, aligns in time, computes the innovation, tests the gate, and
+//! then fuses, rejects, or resets after a lock-out. Models and conditions are in
+//! [`aid`](crate::aid).
 
 use super::fast_turn::Turn;
 use super::gate::{GateResult, Sensor};
@@ -8,35 +11,43 @@ use super::wander::limited;
 use super::*;
 use crate::config::MagModel;
 
-/// Where nothing but the barometer holds the height, the height is reset to one that is this near, m. Farther away one of
-/// them is wrong, and it is not known which: height and climb rate become invalid.
+/// Largest residual for a reset of the height to the barometer where no other sensor measures it,
+/// m. Beyond it one of the two is wrong and it is unknown which: height and climb rate become
+/// invalid.
 const BARO_REACH: f32 = 2.0;
-/// A barometer that was silent for longer counts as silent for so long, s: what it says next is not all motion.
+/// Upper bound on the barometer interval used for the bias walk, s. A longer silence is not all due
+/// to thrust changes.
 const LONGEST_BARO: f32 = 0.5;
-/// A receiver that is silent for longer leaves the height to the barometer.
+/// After this time without an external height the barometer holds the height.
 const FIX_SILENT: Duration = Duration::from_secs(2);
-/// After a silence of six readings the range holds neither height nor climb rate.
+/// After this time without ranges (six readings) the range no longer observes the accelerometer's
+/// vertical bias.
 const RANGE_SILENT: Duration = Duration::from_millis(200);
-/// Variance of the height, m², beyond which the barometer's first offset is as uncertain as that height: after a receiver's first fix.
+/// Height variance, m², above which the first barometer offset inherits the uncertainty of the
+/// height, as after the first fix of a receiver.
 const VAGUE_HEIGHT: f32 = 1.0;
-/// Test ratio of a range that is rejected whatever its gate says.
+/// Test ratio assigned to a range that [`range_gate`](super::range_gate) rejects.
 const REJECTED: f32 = 2.0;
-/// Largest climb rate that a wrong acceleration is taken to have made within the lock-out, m/s: 7.5 m/s², more than the zero of
-/// a shaken accelerometer moves.
+/// Largest climb-rate error assumed to have built up within the lock-out, m/s: 7.5 m/s² for 0.2 s,
+/// more than vibration shifts an accelerometer's zero.
 const WRONG_CLIMB: f32 = 1.5;
-/// The picture never moves farther in its longest interval, rad: 100 rad/s, more than any gyro measures.
+/// Largest image motion in one reading, rad: 100 rad/s over the longest interval, more than any
+/// gyro measures.
 const LARGEST_FLOW: f32 = 10.0;
-/// Largest standard deviation of the height, m, and for each metre of distance: flow is the velocity over it, and a velocity that
-/// may be half or twice as large is none.
+/// Largest standard deviation of the height for flow: `KNOWN_DISTANCE`, m, plus `KNOWN_SHARE` of
+/// the distance. Flow times distance is the velocity, so with a larger error the velocity may be
+/// half or twice the true one.
 const KNOWN_DISTANCE: f32 = 0.1;
 const KNOWN_SHARE: f32 = 0.5;
 
-/// A hand moves a vehicle so slowly that its camera sees it from here on, m.
+/// Shortest distance at which flow is used for a vehicle moved by hand, m; it moves slowly enough
+/// for the camera.
 const NEAREST: f32 = 0.02;
-/// Flow does not correct height, climb rate and the zero that moves them. A leaning camera sees a part
-/// of the climb. Where no range holds it, at the first instant of a take-off or after a reset, it is so
-/// uncertain that a wrong distance, or a leg that slips, would become climb. Its uncertainty still
-/// counts. In a hand nothing shakes the accelerometer, and what flow knows of the climb is worth having.
+/// States that flow in flight considers but does not correct: height, climb rate and vertical
+/// accelerometer bias. A tilted camera measures a part of the climb. At the start of a take-off or
+/// after a reset the climb rate is so uncertain that a wrong distance, or a slipping leg, would be
+/// taken for climb. Their uncertainty stays in the innovation variance. A vehicle in a hand has no
+/// vibration, and there flow's information on the climb is used.
 const VERTICAL: [usize; 3] = [POSITION + 2, VELOCITY + 2, ACCEL_BIAS + 2];
 
 impl Eskf {
@@ -62,7 +73,7 @@ impl Eskf {
             *tested = tested.wrapping_add(1);
         }
         if let Some(anchor) = self.anchor {
-            // Stationary: the range measures the surface below the sensor, not the height of the vehicle.
+            // Stationary: the height is known, so the range measures the surface below the sensor.
             let measured = anchor.z + below;
             self.surface = Some(self.surface.map_or(measured, |surface| surface + 0.1 * (measured - surface)));
             self.range_gate.stand(tof.distance);
@@ -77,8 +88,8 @@ impl Eskf {
         self.range_used = self.now;
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
-        // The beam is a cone and reports what is nearest in it: on a tilted body anything between the range along the
-        // axis and the one straight down.
+        // The beam is a cone and reports the nearest surface in it: on a tilted body anything
+        // between the range along the axis and the vertical distance.
         let cone = tof.distance * (1.0 - cos_tilt);
         let sigma = math::larger(self.config.tof_sigma, tof.sigma) + cone;
         let variance = sigma * sigma;
@@ -93,14 +104,14 @@ impl Eskf {
             GateResult::Reset => {
                 let down = surface - below - delayed.state.position.z;
                 if self.range_gate.rejects_since_jump() {
-                    // No vehicle moves so far from one reading to the next: it is the surface that is another one.
+                    // A vehicle cannot move so far between two readings: the surface has changed.
                     self.surface = Some(surface - down);
                     return Ok(self.finish_reset(Sensor::Tof));
                 }
                 self.state.position.z += down;
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
-                // A wrong height comes from a wrong climb rate, and that from a wrong acceleration in the time of the
-                // lock-out: the next ranges estimate them anew.
+                // The height error came from a climb-rate error, and that from an acceleration
+                // error during the lock-out. Open both, so that the next ranges estimate them.
                 let time = self.config.lockout;
                 let climb = (2.0 * down / time).clamp(-WRONG_CLIMB, WRONG_CLIMB);
                 self.covariance.reset(VELOCITY + 2, 1.0 + climb * climb);
@@ -117,7 +128,8 @@ impl Eskf {
         if !(1e-3..=0.1).contains(&flow.interval) || flow.delta_x.abs() + flow.delta_y.abs() > LARGEST_FLOW {
             return Err(Refusal::Range);
         }
-        // The reading is the mean velocity over the interval: compare it with the state in the middle of it.
+        // The reading is the mean velocity over the interval: compare it with the state at its
+        // middle.
         let late = self.config.flow_delay + 0.5 * flow.interval;
         let middle = at - Duration::from_micros((late * 1e6) as u64);
         let age = self.admit(Sensor::Flow, middle, &[flow.delta_x, flow.delta_y])?;
@@ -127,8 +139,9 @@ impl Eskf {
         }
         let surface = self.surface.ok_or(Refusal::Missing)?;
         let distance = (surface - delayed.state.position.z) / delayed.rotation[2][2];
-        // At a take-off a leg may slip while the picture is blurred. After readings from a sharp distance
-        // the velocity is known well enough for the last centimetres of a landing, and above a table.
+        // During a take-off a leg may slip while the image is blurred. After readings from a sharp
+        // distance the velocity is certain enough for the last centimetres of a landing and for
+        // flight over a table.
         self.has_seen_floor = self.command.flying && (self.has_seen_floor || distance >= self.config.flow_min_distance);
         let takes_off = self.command.flying && !self.has_seen_floor;
         if distance < if takes_off { self.config.flow_min_distance } else { NEAREST } {
@@ -144,40 +157,43 @@ impl Eskf {
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = aid::flow::measured_velocity(rate, [raw.x, raw.y], distance);
         let rows = aid::flow::body_velocity(&delayed.state, &delayed.rotation, distance);
-        // Written out: `map` would be a call.
+        // Not `map`: it would compile to a call.
         let [x, y] = rows;
         let rows = [without_heading(x, &delayed.rotation[2]), without_heading(y, &delayed.rotation[2])];
-        // The part of the error that grows with the image's motion must come from what is predicted: weighing a reading
-        // by itself makes large readings count less and the velocity too small.
+        // The proportional part of the error must be computed from the prediction. Computed from
+        // the reading it gives large readings too little weight, and the velocity becomes too
+        // small.
         let variance = |row: &Row, turning: f32| {
             let base = self.config.flow_sigma * distance;
             let scale = self.config.flow_scale_sigma * (row.predicted + turning * distance);
             base * base + scale * scale
         };
         let variances = [variance(&rows[0], raw.y), variance(&rows[1], -raw.x)];
-        // One gate for both axes: a single axis locked out drifts unnoticed.
+        // One gate for both axes: with separate gates a single axis could be locked out and drift
+        // unnoticed.
         let innovation = self.innovation(delayed, rows, measured, variances);
         let ratio = self.test_ratio(&innovation);
         self.status.flow_innovation = [measured[0] - rows[0].predicted, measured[1] - rows[1].predicted];
         self.status.flow_ratio = ratio;
-        // Flow measures two axes of the body's; along the beam the velocity is the estimated one.
+        // Flow measures two body axes. Along the beam, take the estimated velocity.
         let along = rotate_back(&delayed.rotation, &delayed.state.velocity).z;
         let world = rotate(&delayed.rotation, &Vec3::new(measured[0], measured[1], along));
         if self.anchor.is_none() {
             let fastest = self.config.flow_max_rate;
-            // Of the vehicle itself: a zero that has moved turns nothing.
+            // Bias-free rates: a gyro bias does not move the image.
             match self.fast_turn.step([turning.x, turning.y], flow.interval, fastest) {
                 Turn::Slow => {}
                 Turn::Fast => return Err(Refusal::Range),
                 Turn::Over(angle) => {
-                    // From the next reading on.
+                    // The inflation takes effect with the next reading.
                     self.inflate_turned(angle);
                     return Err(Refusal::Range);
                 }
             }
             let length = |[x, y]: [f32; 2]| math::sqrt(x * x + y * y);
             let picture = length([rows[0].predicted / distance + raw.y, rows[1].predicted / distance - raw.x]);
-            // The gate tests a picture that contradicts the estimate by more.
+            // Both the reading and the prediction count, because a reading beyond the limit
+            // aliases. A larger contradiction is left to the gate.
             let [slower, faster] = [math::smaller(length(rate), picture), math::larger(length(rate), picture)];
             if self.command.flying && faster > fastest && slower > 0.5 * fastest {
                 return Err(Refusal::Range);
@@ -199,8 +215,8 @@ impl Eskf {
                     self.covariance.consider(&innovation, VERTICAL, &mut correction);
                 }
                 self.state.correct(&correction);
-                // On the ground the zero-velocity update holds the velocity, so a bias of flow's innovations shows
-                // nothing.
+                // On the ground the zero-velocity update holds the velocity, so a bias of the
+                // innovations has no meaning.
                 if self.anchor.is_none() && self.flow_innovation_bias.update(innovation.whitened(), flow.interval) {
                     self.inflate_on_innovation_bias();
                 }
@@ -215,7 +231,7 @@ impl Eskf {
                 for (axis, variance) in variances.into_iter().enumerate() {
                     self.covariance.reset(VELOCITY + axis, 4.0 * variance + 0.01);
                 }
-                // A wrong velocity comes from a wrong tilt or bias.
+                // The velocity error came from an error of tilt or bias.
                 self.inflate_tilt();
                 Ok(self.finish_reset(Sensor::Flow))
             }
@@ -229,11 +245,12 @@ impl Eskf {
         let age = self.admit(Sensor::Baro, at, &[baro.altitude])?;
         let Some(delayed) = &self.state_at(age) else { return Err(Refusal::Stale) };
         if self.is_nowhere(2) {
-            // An altitude of what? The first fix says.
+            // The altitude has no reference before the first fix.
             return Err(Refusal::Missing);
         }
         if self.command.flying && self.anchor.is_none() && self.now.since(self.range_used) > RANGE_SILENT {
-            // Only a range shows how the accelerometer's zero moves with the thrust; without one it may be anywhere near.
+            // Only a range observes how the accelerometer's bias moves with the thrust. Without
+            // ranges let it walk.
             let walk = self.config.thrust_bias_walk;
             let time = self.now.since(self.baro_updated).seconds().min(LONGEST_BARO);
             self.covariance.inflate(ACCEL_BIAS + 2, walk * walk * time);
@@ -258,11 +275,13 @@ impl Eskf {
         self.status.baro_ratio = ratio;
         match self.test(Sensor::Baro, ratio) {
             GateResult::Fuse => {
-                // Where the receiver is silent, the zero that it has shown holds the height, and not the other way round.
+                // With `baro_backup`, once the receiver is silent the learnt offset holds the
+                // height and must not follow it.
                 if let Some(offset) = self.baro_offset.as_mut().filter(|_| backup || !self.config.baro_backup) {
                     offset.update(residual, noise + height);
                     if backup {
-                        // The same error of the height is in every difference.
+                        // The error of the height is common to all differences: the offset is at
+                        // most as certain as the height.
                         offset.inflate((height - offset.variance()).max(0.0));
                     }
                 }
@@ -270,7 +289,8 @@ impl Eskf {
                     return Ok(Fusion::Fused { ratio });
                 }
                 let innovation = if self.config.baro_backup {
-                    // However many altitudes tell the height, it is not known better than the zero.
+                    // However many altitudes are fused, the height is not more certain than the
+                    // offset.
                     let variance = limited(height, variance, offset.variance());
                     self.innovation(delayed, [row], [baro.altitude], [variance])
                 } else {
@@ -281,8 +301,8 @@ impl Eskf {
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 if backup || self.is_range_aided() || self.anchor.is_some() {
-                    // A jump of the air pressure does not move the vehicle: reset the offset, which is no sign of
-                    // divergence, and no aiding either.
+                    // A jump of the air pressure does not move the vehicle: reset the offset. That
+                    // is neither a sign of divergence nor aiding.
                     self.baro_offset = Some(Offset::new(here, noise));
                     self.gates.restart_lockout(Sensor::Baro, self.now);
                     self.status.resets = self.status.resets.wrapping_add(1);
@@ -291,7 +311,7 @@ impl Eskf {
                 if residual.abs() > BARO_REACH {
                     return Ok(Fusion::Gated { ratio });
                 }
-                // Nothing else holds the height: it was the filter that went astray.
+                // No other sensor holds the height: the filter has diverged from it.
                 self.state.position.z -= residual;
                 self.covariance.reset(POSITION + 2, 4.0 * noise);
                 self.covariance.reset(VELOCITY + 2, 1.0);
@@ -340,8 +360,8 @@ impl Eskf {
             return self.update(innovation, ratio);
         }
         if verdict == GateResult::Reset {
-            // No other sensor corrects the heading: inflate it, once per lock-out, until the field passes the gate
-            // again.
+            // No other sensor corrects the heading. Inflate it, once per lock-out, until the field
+            // passes the gate.
             self.gates.restart_lockout(Sensor::Mag, self.now);
             let vertical = self.state.rotation()[2];
             for (axis, part) in vertical.iter().enumerate() {
@@ -352,10 +372,10 @@ impl Eskf {
     }
 }
 
-/// A flow row that does not observe the heading: without the part of its attitude columns along the vertical, as the
-/// body sees it. In theory flow shows the heading while the vehicle accelerates; in practice a degree of mounting error
-/// and the beat of pictures and reads turn the estimated heading by degrees a minute, where a calibrated gyro alone
-/// keeps it within one.
+/// A flow row without information on the heading: the component of its attitude columns along the
+/// vertical (in body axes) is removed. In theory flow observes the heading while the vehicle
+/// accelerates. In practice one degree of mounting error and the beat of frames and reads turn the
+/// heading by degrees a minute, while a calibrated gyro alone keeps it within one.
 #[inline(always)]
 fn without_heading(mut row: Row, vertical: &[f32; 3]) -> Row {
     let [.., x, y, z, _, _, _, _, _, _] = &mut row.jacobian;

@@ -1,30 +1,39 @@
 //! Pseudo-measurements: updates and resets without a sensor of position or velocity.
 //!
-//! | pseudo-measurement | active while | stops | gated |
-//! |---|---|---|---|
-//! | [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood | commanded `on_ground`, every fourth sample | take-off; an origin reset moves the position to zero | no |
-//! | [`update_gravity`](Eskf::update_gravity): gravity as the vertical | stationary; with [`GravityUse::WhenUnaided`] while nothing holds the velocity, drag included; with [`GravityUse::Always`] all samples in flight, by their mean over a step of the covariance | the other cases | yes, reset in `aid/gravity.rs` |
-//! | [`update_drag`](Eskf::update_drag): the velocity that the body's drag shows | flying with a known `drag` and nothing that holds the velocity, instead of gravity | the other cases | no |
-//! | [`constrain_heading`](Eskf::constrain_heading): heading zero | once, at initialisation | | no |
-//! | [`reset_unobserved_motion`](Eskf::reset_unobserved_motion): velocity to zero at the largest deviation | nothing holds the velocity | flow, velocity or position within the last second, or on the ground | no |
-//! | [`constrain_unobserved_velocity`](Eskf::constrain_unobserved_velocity): velocity near zero | tilt beyond `min_cos_tilt`, flow within the last second, no external velocity or position | the other cases | no |
+//! - [`constrain_stationary`](Eskf::constrain_stationary): velocity zero, position where it stood.
+//!   While commanded `on_ground`, every fourth sample, until take-off. An origin reset moves the
+//!   position to zero. No gate.
+//! - [`update_gravity`](Eskf::update_gravity): gravity as the vertical. While stationary; with
+//!   [`GravityUse::WhenUnaided`] while the velocity is not measured, drag included; with
+//!   [`GravityUse::Always`] all samples in flight, as their mean over a covariance step. Gated; its
+//!   reset is described in `aid/gravity.rs`.
+//! - [`update_drag`](Eskf::update_drag): velocity from drag. In flight with a known `drag` while
+//!   the velocity is not measured, instead of gravity. No gate.
+//! - [`constrain_heading`](Eskf::constrain_heading): heading zero. Once, at initialisation. No
+//!   gate.
+//! - [`reset_unobserved_motion`](Eskf::reset_unobserved_motion): velocity to zero at its largest
+//!   standard deviation. While the velocity is not measured and the vehicle is not on the ground.
+//!   No gate.
+//! - [`constrain_unobserved_velocity`](Eskf::constrain_unobserved_velocity): velocity near zero.
+//!   While the tilt is beyond `min_cos_tilt`, flow was accepted within the last second, and no
+//!   external velocity or position is. No gate.
 
 use super::gate::{GateResult, Sensor};
 use super::*;
 
-/// For how long a gust lasts, s (MIL-F-8785C's low-altitude turbulence has a length of some metres at this height).
+/// Duration of a gust, s. (The low-altitude turbulence of MIL-F-8785C has a length of some metres
+/// at this height.)
 const GUST: f32 = 2.0;
-/// Standard deviation of what else the accelerometer feels along x and y, m/s².
+/// Standard deviation of the other accelerations along body x and y, m/s².
 const FELT: f32 = 0.1;
-/// Variance of an angle that may be any, rad²: π²/3, and some more.
+/// Variance of an unknown angle, rad²: π²/3, with a margin.
 pub(super) const ANY_ATTITUDE: f32 = 4.0;
 /// Standard deviation of the heading where it is defined to be zero, rad.
 const HEADING_SIGMA: f32 = 1e-3;
 
 impl Eskf {
-    /// Zero-velocity and zero-displacement update (ZUPT) of a stationary vehicle, which makes the accelerometer's bias
-    /// observable.
-    // On the ground only.
+    /// Zero-velocity and zero-displacement update (ZUPT) of a stationary vehicle. It makes the
+    /// accelerometer bias observable.
     #[inline(never)]
     pub(super) fn constrain_stationary(&mut self, anchor: Vec3) {
         let sigma = self.config.stationary_velocity_sigma;
@@ -32,9 +41,10 @@ impl Eskf {
         self.constrain(aid::position::world(&self.state), anchor.into(), self.config.stationary_position_sigma);
     }
 
-    /// Update with gravity as the vertical, for a body whose own acceleration is known.
+    /// Update with gravity as the vertical, for a body whose acceleration (world, m/s²) is known.
     pub(super) fn update_gravity(&mut self, accel: Vec3, acceleration: &Vec3, sigma: f32) {
-        // The farther from one g, the more it is motion or vibration and the less it is tilt.
+        // The farther the force is from the expected length, the more it is motion or vibration
+        // instead of tilt.
         let excess = accel.norm() - (acceleration - Vec3::new(0.0, 0.0, GRAVITY)).norm();
         let variance = sigma * sigma + 10.0 * excess * excess;
         let delayed = self.current_state();
@@ -54,12 +64,12 @@ impl Eskf {
             GateResult::Fuse => self.update(&innovation, ratio),
             GateResult::Reject => Fusion::Gated { ratio },
             GateResult::Reset => {
-                // Nothing else corrects the attitude: inflate it, once per lock-out, until gravity passes the gate
-                // again.
+                // No other sensor corrects the attitude here. Inflate it, once per lock-out, until
+                // gravity passes the gate.
                 self.gates.restart_lockout(Sensor::Gravity, self.now);
                 for axis in 0..3 {
                     self.covariance.inflate(ATTITUDE + axis, 0.1);
-                    // A wrong tilt turned gravity into velocity, and into accelerometer bias.
+                    // The wrong tilt turned gravity into velocity and accelerometer bias.
                     self.state.velocity[axis] = 0.0;
                     self.covariance.reset(VELOCITY + axis, self.config.unaided_velocity * self.config.unaided_velocity);
                     self.reset_accel_bias(axis);
@@ -70,11 +80,12 @@ impl Eskf {
         _ = self.count(Counter::Gravity, fusion);
     }
 
-    /// Update with the drag of a multirotor in the air, which shows its horizontal velocity, for `dt` seconds.
+    /// Update with the drag of a multirotor in flight, over `dt` seconds. It measures the
+    /// horizontal velocity.
     pub(super) fn update_drag(&mut self, accel: Vec3, dt: f32) {
         let delayed = self.current_state();
         let rows = aid::drag::specific_force(&delayed.state, &delayed.rotation, self.config.drag);
-        // A gust is the same error in many readings: together they count as one for each of its durations.
+        // A gust is a common error of many samples: weigh them so that they count as one per gust.
         let wind = self.config.drag * self.config.wind;
         let variance = (wind * wind + FELT * FELT) * (2.0 * GUST / dt.max(1e-3));
         let innovation = self.innovation(&delayed, rows, [accel.x, accel.y], [variance; 2]);
@@ -88,17 +99,17 @@ impl Eskf {
         self.covariance.reset(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
     }
 
-    /// Constrains the heading at initialisation, where it is zero by definition. With a larger variance every error of
-    /// the flow sensor would turn it.
+    /// Constrains the heading at initialisation, where it is zero by definition. With a larger
+    /// variance, errors of the flow sensor would rotate it.
     pub(super) fn constrain_heading(&mut self) {
         let [x, y, z] = self.state.rotation()[2];
         let row = Row::new(0.0, [(ATTITUDE, x), (ATTITUDE + 1, y), (ATTITUDE + 2, z)]);
         self.constrain([row], [0.0], HEADING_SIGMA);
     }
 
-    /// Limits the variance of velocity and position, and sets a velocity at its limit to zero. Without a measurement
-    /// the velocity is the integral of a small tilt error and soon larger than any that the vehicle can fly; at zero it
-    /// waits for the next measurement.
+    /// Limits the variances of velocity and position, and sets a velocity at its limit to zero.
+    /// Without a measurement the velocity is the integral of a small tilt error and soon exceeds
+    /// any that the vehicle can fly. Zero is the better start for the next measurement.
     pub(super) fn reset_unobserved_motion(&mut self) {
         for (block, limit) in [(VELOCITY, self.config.unaided_velocity), (POSITION, self.config.unaided_position)] {
             for axis in 0..3 {
@@ -112,8 +123,9 @@ impl Eskf {
         }
     }
 
-    /// Limits the variance of the attitude. A gyro that is shaken beyond its range says nothing, and soon the attitude could be anything;
-    /// more than that would only be large beside the other variances, whose digits it takes.
+    /// Limits the variance of the attitude to that of an unknown angle. A gyro shaken beyond its
+    /// range adds variance without limit, and a much larger value would cost the other covariances
+    /// their precision in `f32`.
     #[inline]
     pub(super) fn limit_attitude(&mut self) {
         for axis in ATTITUDE..GYRO_BIAS {
@@ -123,9 +135,9 @@ impl Eskf {
         }
     }
 
-    /// Constrains the velocity near zero, for `dt` seconds, while the tilt hides the ground from range and flow: the
-    /// integral of a tilt error grows by the second. Vehicles that use their velocity do not fly like this; they are
-    /// carried so by hand, slowly.
+    /// Constrains the velocity near zero over `dt` seconds, while the tilt hides the ground from
+    /// range and flow and the integral of the tilt error grows. A vehicle that flies by its
+    /// velocity does not tilt that far; one carried by a person does, and moves slowly.
     pub(super) fn constrain_unobserved_velocity(&mut self, dt: f32) {
         let sigma = self.config.unobserved_velocity / math::sqrt(dt.max(1e-3));
         self.constrain(aid::velocity::world(&self.state), [0.0; 3], sigma);

@@ -1,74 +1,77 @@
-//! Which ranges are compared with the estimate at all.
+//! Plausibility of ranges, tested before the innovation gate.
 //!
-//! | a range that | is |
-//! |---|---|
-//! | is as near as where the vehicle stands, far from the expected one | left out: no floor comes so near to a vehicle that flies. It is the sensor's window, where the floor is out of reach |
-//! | leaps: it is far from the one before and from the expected one | rejected until another one confirms it |
-//! | repeats itself | left out from the fifth time on: it measures no climb |
-//! | is rejected for the lock-out time, and the first of them jumped | a new surface: no vehicle moves as far between two readings |
+//! - **Window**: as near as where the vehicle stood, and far from the expected range. Ignored: the
+//!   sensor sees its own window because the floor is out of reach. A flying vehicle is never that
+//!   near to the floor.
+//! - **Leap**: far from both the last and the expected range. Rejected until the next range
+//!   confirms it.
+//! - **Repetition**: bit-identical values. Ignored from the fifth one on, because such a sensor
+//!   measures no climb.
+//! - **Jump**: rejected for the whole lock-out time, and the first rejected range had jumped. The
+//!   surface has changed, because no vehicle moves that far between two readings.
 
 use stampfly_types::{Instant, math};
 
-/// Smallest change from the range before that is a jump, m.
+/// Smallest change from the last range that counts as a jump, m.
 const JUMP: f32 = 0.15;
-/// Smallest change from the range before, and from the expected range, that is a leap, m.
+/// Smallest change from the last range, and from the expected one, that counts as a leap, m.
 const LEAP: f32 = 0.05;
-/// What the climb rate may be wrong by, in standard deviations, moves the range as well.
+/// Number of standard deviations of the climb rate that are allowed to move the range in addition.
 const SIGMAS: f32 = 3.0;
-/// A window that is smeared sends its light back from nearer than where the vehicle stands, and is
-/// read with noise of some millimetres, m.
+/// Margin for recognising the window, m. A smeared window reflects from nearer than the standing
+/// distance, and readings have some millimetres of noise.
 const WINDOW: f32 = 0.01;
-/// Weight of a reading in the range of a vehicle that stands.
+/// Weight of a reading in the mean standing distance.
 const STANDS: f32 = 0.1;
-/// Number of repetitions after which a range is left out: 0.13 s, in which a take-off rises by 4 cm.
+/// Number of repetitions after which a range is ignored: 0.13 s, in which a take-off rises by 4 cm.
 const UNUSED: u32 = 4;
-/// After a silence of this length, s, a change is the vehicle's motion and not a jump.
+/// After a silence of this length, s, a change is motion of the vehicle and not a jump.
 const SILENT: f32 = 0.2;
 
-/// What may be done with a range.
+/// Permitted use of a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Use {
-    /// What its test ratio says.
+    /// Apply the innovation gate.
     Gate,
-    /// It counts as one that is outside the gate.
+    /// Count it as outside the gate.
     Reject,
-    /// Nothing.
+    /// Do not use it.
     Ignore,
 }
 
-/// The last range.
+/// The last range and its history.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RangeGate {
     distance: f32,
-    /// What was expected, m.
+    /// Prediction for the last range, m.
     expected: f32,
     at: Option<Instant>,
     repeats: u32,
-    /// What is measured where the vehicle stands, m.
+    /// Mean range on the ground, m.
     standing: Option<f32>,
-    /// The first of those that are being rejected had jumped.
+    /// Whether the first of the present series of rejected ranges had jumped.
     jumped: bool,
 }
 
 impl RangeGate {
-    /// Takes a range of a vehicle that stands, m.
+    /// Takes a range of the stationary vehicle, m.
     pub(super) fn stand(&mut self, distance: f32) {
         self.standing = Some(self.standing.map_or(distance, |before| before + STANDS * (distance - before)));
     }
 
-    /// Is it the sensor's window that this range, m, measures? See the head of the file.
+    /// Whether this range, m, is a reflection from the sensor's window. See the head of the file.
     pub(super) fn is_window(&self, distance: f32, expected: f32) -> bool {
         self.standing.is_some_and(|standing| distance < standing + WINDOW) && expected - distance > JUMP
     }
 
-    /// Takes a range, and what is expected, m, with the standard deviation of the climb rate, m/s.
-    /// `rejecting`: the one before was rejected.
+    /// Takes a range and its prediction, m, with the standard deviation of the climb rate, m/s.
+    /// `rejecting`: the last range was rejected.
     pub(super) fn step(&mut self, at: Instant, distance: f32, expected: f32, climb_sigma: f32, rejecting: bool) -> Use {
         let silence = self.at.replace(at).map(|last| at.since(last).seconds());
         let free = SIGMAS * climb_sigma * silence.unwrap_or(0.0);
-        // Nor does what the vehicle itself moves by: it falls at 5 m/s, and leans to the other side
-        // within two readings.
+        // The vehicle's own motion is no jump either: it may fall at 5 m/s, or change its lean
+        // between two readings.
         let moved = expected - self.expected;
         let change = math::smaller((distance - self.distance).abs(), (distance - self.distance - moved).abs());
         let follows = silence.is_some_and(|silence| silence < SILENT);
@@ -86,7 +89,7 @@ impl RangeGate {
         }
     }
 
-    /// Did the first of the ranges that are being rejected jump?
+    /// Whether the first of the ranges that are being rejected had jumped.
     pub(super) fn rejects_since_jump(&self) -> bool {
         self.jumped
     }
@@ -97,7 +100,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// What is done with these ranges, a thirtieth of a second apart, where half a metre is expected.
+    /// Uses of these ranges, 33 ms apart, where 0.5 m is expected.
     fn uses(ranges: &[f32]) -> Vec<Use> {
         let mut gate = RangeGate::default();
         let step = |(n, range): (usize, &f32)| {

@@ -1,64 +1,67 @@
-//! What is put right when the estimate is found to be wrong.
+//! Inflation, resets and restarts of a wrong estimate.
 //!
-//! | found by | put right | counts towards divergence |
-//! |---|---|---|
-//! | the lock-out of a sensor ([`gate`](super::gate)) | the state that it measures, by its update; [`finish_reset`](Eskf::finish_reset) | yes |
-//! | flow's innovations ([`innovation_bias`](super::innovation_bias)) | variance of tilt and gyro bias | yes |
-//! | a turn that is faster than flow follows | variance of the tilt | no |
-//! | a monitor of the sensors ([`correct`](crate::Estimator::correct)) | attitude, velocity, biases | no |
-//! | [`check_health`](Eskf::check_health): a state that is no number or beyond any flight | position and velocity, on the ground everything | it is divergence |
+//! - **Lock-out of a sensor** ([`gate`](super::gate)): its update resets the state that it
+//!   measures; [`finish_reset`](Eskf::finish_reset) counts it towards divergence.
+//! - **Biased flow innovations** ([`innovation_bias`](super::innovation_bias)): inflates tilt and
+//!   gyro bias. Counts towards divergence.
+//! - **Turn too fast for flow**: inflates the tilt.
+//! - **Finding of a monitor** ([`correct`](crate::Estimator::correct)): corrects attitude, velocity
+//!   and biases.
+//! - **[`check_health`](Eskf::check_health)**: a state that is not finite, an unsound covariance,
+//!   or motion beyond any flight. Restarts position and velocity, on the ground everything, and
+//!   reports divergence.
 
 use super::*;
 
-/// Standard deviation of the tilt after a turn that flow did not see, share of the turn: errors of
-/// the gyro's scale and axes, of which 3 % are usual, and as much for a zero that has shifted
-/// meanwhile.
+/// Tilt standard deviation after a turn too fast for flow, as a share of the angle: 3 % for errors
+/// of the gyro's scale and axes, and as much for a zero that has shifted meanwhile.
 const TURNED: f32 = 0.05;
-/// Standard deviations added to tilt and gyro bias when flow's innovations are biased, and after a reset to flow: rad
-/// and rad/s.
+/// Standard deviations added to tilt, rad, and gyro bias, rad/s, when flow innovations are biased
+/// and after a reset to flow.
 const TILT_INFLATION: f32 = 0.1;
 const GYRO_BIAS_INFLATION: f32 = 0.03;
-/// Standard deviation that the tilt gains until north is found, rad.
+/// Standard deviation added to the tilt when the heading is found, rad.
 const ALIGNED_TILT: f32 = 0.03;
 /// Standard deviation of the velocity after a restart in flight, m/s.
 const RESTART_VELOCITY: f32 = 3.0;
-/// A position beyond this share of the largest does not survive a restart in flight.
+/// Share of `max_position` beyond which a position is discarded at a restart in flight.
 const KEPT_POSITION: f32 = 0.5;
 
 impl Eskf {
-    /// Empties the history: after a reset of the attitude its velocity changes point elsewhere, after a gap their time
-    /// is wrong. Late measurements are refused until it has filled again.
+    /// Clears the history: after a reset of the attitude its velocity changes have the wrong
+    /// direction, and after a gap the wrong time. Late measurements are refused until it has filled
+    /// again.
     pub(super) fn reset_history(&mut self) {
         self.history.clear();
         self.pending_step = PropagationStep::default();
         self.pending_rotation = self.state.rotation();
     }
 
-    /// Counts a reset of the state to a sensor that had been locked out.
+    /// Counts a reset of the state to a sensor after its lock-out.
     pub(super) fn finish_reset(&mut self, sensor: Sensor) -> Fusion {
         self.status.resets = self.status.resets.wrapping_add(1);
         self.status.diverged |= self.gates.record_reset(sensor, self.now);
         Fusion::Reset
     }
 
-    /// Inflates tilt and gyro bias because flow's innovations are biased. Counts as a reset: many in a row mean that
-    /// the estimate has diverged.
+    /// Inflates tilt and gyro bias after biased flow innovations. Counts as a reset, so that many
+    /// in sequence report divergence.
     pub(super) fn inflate_on_innovation_bias(&mut self) {
         self.inflate_tilt();
         self.status.diverged |= self.gates.count_reset(self.now);
     }
 
-    /// Inflates the tilt and the gyro bias that may have tilted it.
+    /// Inflates the tilt and the gyro bias that may have caused it.
     pub(super) fn inflate_tilt(&mut self) {
         for axis in 0..2 {
             self.covariance.inflate(ATTITUDE + axis, TILT_INFLATION * TILT_INFLATION);
             self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
-            // Tilt and accelerometer bias look alike to flow: the bias is estimated anew.
+            // Flow cannot distinguish tilt from accelerometer bias: estimate the bias again.
             self.reset_accel_bias(axis);
         }
     }
 
-    /// The vehicle has turned by this angle, rad, faster than flow follows.
+    /// Inflates the tilt after a turn by `angle`, rad, that was too fast for flow.
     pub(super) fn inflate_turned(&mut self, angle: f32) {
         let tilt = TURNED * angle;
         for axis in 0..2 {
@@ -66,8 +69,7 @@ impl Eskf {
         }
     }
 
-    /// Puts right what a sensor that was wrong has done.
-    // Hardly ever.
+    /// Applies a monitor's correction. Ignored before initialisation and if a value is not finite.
     #[inline(never)]
     pub(super) fn correct_by(&mut self, correction: &EstimateCorrection) {
         let EstimateCorrection { turn, velocity, down, gyro_bias, accel_bias, .. } = correction;
@@ -82,14 +84,14 @@ impl Eskf {
         self.state.position.z += down;
         self.state.gyro_bias += gyro_bias;
         self.state.accel_bias += accel_bias;
-        // With this bias a restart begins.
+        // A restart must not return to the bias of the faulty sensor.
         self.calibration.gyro_bias = self.state.gyro_bias;
         let square = |sigma: f32| if sigma.is_finite() { sigma * sigma } else { 0.0 };
         if correction.climb_sigma > 0.0 {
             self.covariance.reset(VELOCITY + 2, square(correction.climb_sigma));
             self.covariance.inflate(POSITION + 2, 0.1);
             self.covariance.reset(ACCEL_BIAS + 2, 0.1);
-            // The barometer holds the height from here.
+            // The barometer's offset was learnt with the wrong height.
             self.baro_offset = None;
         }
         for axis in (0..2).filter(|_| correction.tilt_sigma > 0.0) {
@@ -102,8 +104,9 @@ impl Eskf {
         self.status.resets = self.status.resets.wrapping_add(1);
     }
 
-    /// Turns the world about its vertical, in which the heading had not been known, by `turn`, rad. The heading has the standard deviation
-    /// `sigma` then, and the tilt that of a vehicle that has moved without any measurement of it.
+    /// Rotates the world frame about the vertical by `turn`, rad, once the heading has been found.
+    /// The heading then has the standard deviation `sigma`, rad; the tilt gains that of a vehicle
+    /// that moved without aiding.
     pub(super) fn turn_to_north(&mut self, turn: f32, sigma: f32) {
         let (sin, cos) = math::sin_cos(0.5 * turn);
         let turn = [cos, 0.0, 0.0, sin];
@@ -120,13 +123,14 @@ impl Eskf {
         self.alignment.found();
     }
 
-    /// Starts position and velocity again, in flight. Attitude, heading and biases are better than those of the
-    /// calibration at power-on, so they stay; their variance grows by what drove the estimate away.
+    /// Restarts position and velocity in flight. Attitude, heading and biases are better than those
+    /// of the calibration at power-on, so they stay; their variances grow by what may have driven
+    /// the estimate away.
     pub(super) fn restart_motion(&mut self) {
         let mut variances = initial_covariance(&self.config);
         for axis in 0..3 {
             for (block, limit) in [(ATTITUDE, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 2.0)] {
-                // A covariance that is not sound says nothing.
+                // An unsound covariance holds no information: take the limit.
                 let before = self.covariance.get(block + axis, block + axis);
                 let before = if before.is_finite() { before.max(0.0).min(limit) } else { limit };
                 variances.reset(block + axis, before);
@@ -141,7 +145,8 @@ impl Eskf {
             self.covariance.inflate(GYRO_BIAS + axis, GYRO_BIAS_INFLATION * GYRO_BIAS_INFLATION);
             self.covariance.inflate(ACCEL_BIAS + axis, self.config.initial_accel_bias * self.config.initial_accel_bias);
         }
-        // Where that is, is a matter of definition; a jump would be flown back.
+        // The origin is a matter of definition, and a position controller would fly back after a
+        // jump: keep it.
         let kept = KEPT_POSITION * self.config.max_position;
         self.state.position = self.state.position.map(|axis| if axis.abs() < kept { axis } else { 0.0 });
         self.state.velocity = Vec3::zeros();
@@ -159,8 +164,8 @@ impl Eskf {
         self.status.diverged = false;
     }
 
-    /// Starts again: on the ground, or where the attitude is no number, from the last calibration; in flight position and
-    /// velocity only.
+    /// Restarts after divergence: on the ground, or with an attitude that is not finite, from the
+    /// last calibration; in flight position and velocity only.
     pub(super) fn restart(&mut self) {
         let (at, calibration, status) = (self.now, self.calibration, self.status);
         if self.anchor.is_some() || !self.state.is_finite() {
@@ -173,9 +178,10 @@ impl Eskf {
         self.status.diverged = true;
     }
 
-    /// Restarts a filter that is not finite or whose covariance is not sound; a position or velocity beyond any flight
-    /// means divergence. Where nothing measures the horizontal position it is nobody's claim. Nor are, of a vehicle that is not
-    /// told to fly, a horizontal velocity that nothing measures and a height that nothing has ever measured.
+    /// Restarts a filter whose state is not finite or whose covariance is unsound, and reports
+    /// divergence of position or velocity beyond any flight. Not tested: a horizontal position
+    /// without aiding, which is marked invalid anyway; and, while the vehicle is not commanded to
+    /// fly, an unmeasured horizontal velocity and a height never measured.
     pub(super) fn check_health(&mut self) {
         let NominalState { position, velocity, .. } = &self.state;
         let EskfConfig { max_velocity, max_position, .. } = self.config;
@@ -189,7 +195,7 @@ impl Eskf {
         }
     }
 
-    /// Is the vertical position more than the sum of what the inertial sensor felt?
+    /// Whether the vertical position is more than the integral of the inertial sensor.
     fn claims_height(&self) -> bool {
         let measured = self.surface.is_some() || self.baro_offset.is_some() || self.is_aided_outside(Sensor::Down);
         self.command.flying || measured

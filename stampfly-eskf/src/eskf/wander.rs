@@ -1,42 +1,44 @@
-//! How much of a receiver's error stays the same from fix to fix?
+//! Separates the constant part of a receiver's position error from its noise.
 //!
-//! A receiver that says 1.5 m is wrong by 1.5 m for a minute, and by half a metre differently in each fix. Taken for 1.5 m of white
-//! noise, a hundred fixes would make 0.15 m of it, which nobody knows. The white part shows: it is half of the mean square by which
-//! a fix differs from the one before, less the way in between. What the stated variance has beyond it, is a floor under the
-//! variance of the position: below it a fix tells nothing.
+//! A receiver that states 1.5 m may be wrong by 1.5 m for a minute, and by half a metre differently
+//! in each fix. Treated as 1.5 m of white noise, a hundred fixes would reduce the standard
+//! deviation to 0.15 m, which is too small. The white part is observable: half the mean square
+//! difference of successive fixes, less the motion in between. The rest of the stated variance is a
+//! floor for the position variance: at the floor, a fix adds no information.
 //!
 //! | | condition |
 //! |---|---|
-//! | start | `position_wander`; until fixes have shown that they differ, all of the error stays |
+//! | start | `position_wander`; until the differences are known, all of the error counts as constant |
 //! | white | the differences explain most of the stated variance: no floor |
-//! | first, and after [`PAUSE`] | such a fix is news: no floor, and no difference to look at |
+//! | first fix, and after [`PAUSE`] | new information: no floor, and no difference is taken |
 
 use stampfly_types::{Duration, Instant, math};
 
-/// Fixes over which the mean is taken: long enough that chance does not take white noise for half of it.
+/// Number of fixes in the mean: enough that white noise is not taken for half constant by chance.
 const FIXES: f32 = 300.0;
-/// The way in between is known over so long.
+/// Longest interval between two fixes over which the motion is known well enough.
 const PAUSE: Duration = Duration::from_millis(2_500);
-/// Share of the stated variance that the differences have to explain: so much less than all of it as chance takes from a mean of so
-/// many fixes, over their root; and never less than a half.
+/// Share of the stated variance that the differences must explain to count as white: `WHITE`, less
+/// `CHANCE` over the root of the number of differences, at least `LEAST_WHITE`.
 const WHITE: f32 = 0.85;
 const CHANCE: f32 = 2.5;
 const LEAST_WHITE: f32 = 0.55;
 
-/// What fixes have shown of their errors.
+/// Statistics of the fixes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Wander {
     last: Instant,
-    /// The last fix less the position after it, m.
+    /// Last fix minus the position after its update, m.
     residual: [f32; 3],
-    /// Mean squares of half the differences, m², and of how many.
+    /// Mean of half the squared differences, m², and their number.
     white: [f32; 3],
     differences: f32,
 }
 
 impl Wander {
-    /// Takes a fix less the estimated position before it, m. Does it follow another one?
+    /// Takes a fix minus the estimated position before its update, m. Returns whether it follows
+    /// another fix.
     pub(super) fn fix(&mut self, at: Instant, innovations: [f32; 3]) -> bool {
         let follows = self.last > Instant::ZERO && at.since(self.last) < PAUSE;
         if follows {
@@ -50,14 +52,14 @@ impl Wander {
         follows
     }
 
-    /// The position has moved by this, m, since the fix was compared with it.
+    /// Takes the change of the position by the update, m.
     pub(super) fn moved(&mut self, by: [f32; 3]) {
         for (residual, by) in self.residual.iter_mut().zip(by) {
             *residual -= by;
         }
     }
 
-    /// Floor under the variance along one axis, m², for fixes of this variance.
+    /// Floor of the variance along one axis, m², for fixes of this stated variance.
     pub(super) fn floor(&self, axis: usize, variance: f32) -> f32 {
         let white = self.white.get(axis).copied().unwrap_or_default();
         let share = (WHITE - CHANCE / math::sqrt(self.differences.max(1.0))).max(LEAST_WHITE);
@@ -65,9 +67,10 @@ impl Wander {
     }
 }
 
-/// Variance with which a measurement leaves at least `floor` of a variance; of noise `variance` otherwise.
+/// Measurement variance that leaves at least `floor` of the variance `prior`; at least `variance`.
 pub(super) fn limited(prior: f32, variance: f32, floor: f32) -> f32 {
-    // prior·v/(prior + v) = floor; above, the noise itself leaves more.
+    // Posterior prior·v/(prior + v) = floor, solved for v. A larger noise variance leaves more than
+    // the floor.
     let least = if prior > floor { prior * floor / (prior - floor) } else { f32::MAX };
     variance.max(least)
 }

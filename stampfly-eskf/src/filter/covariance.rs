@@ -1,10 +1,11 @@
-//! The covariance of the error state, stored for speed.
+//! Covariance of the error state in block storage.
 //!
-//! Five by five blocks of three by three, whose rows are `Lanes`. All operations go block by block, so that the compiler turns each into a
-//! few vector instructions on a host and into tight loops on a microcontroller. The matrix stays exactly symmetric by
-//! construction: the update subtracts w·wᵀ, the propagation mirrors.
+//! Five by five blocks of three by three, whose rows are `Lanes`. All operations go block by block,
+//! so that the compiler emits a few vector instructions per block on a host and tight loops on a
+//! microcontroller. The matrix is exactly symmetric by construction: the update subtracts w·wᵀ, the
+//! propagation mirrors one triangle.
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
 //! | `covariance.rs` | storage, single elements |
 //! | `covariance/propagate.rs` | F·P·Fᵀ + Q over a short step |
@@ -20,7 +21,7 @@ pub use super::layout::N;
 pub use propagate::ProcessNoise;
 pub use update::Innovation;
 
-/// Blocks in a row: position, velocity, attitude, gyro bias, accelerometer bias.
+/// Blocks per row: position, velocity, attitude, gyro bias, accelerometer bias.
 const BLOCKS: usize = 5;
 
 type Row = [Lanes; BLOCKS];
@@ -32,16 +33,18 @@ pub struct Covariance {
     rows: [[Row; 3]; BLOCKS],
 }
 
-/// Adds multiples of rows to a row, one after the other, from block `FIRST` on.
-// A few vector instructions, or a hundred scalar ones that want to be there once.
+/// Adds multiples of rows to a row, in sequence, from block `FIRST` on. The fixed order keeps the
+/// result bit-identical on all machines.
+// Inlined where it is a few vector instructions; one shared copy where it is a hundred scalar ones.
 #[cfg_attr(any(target_arch = "x86_64", target_arch = "aarch64"), inline(always))]
 #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), inline)]
 fn add_rows<const FIRST: usize, const K: usize>(to: &mut Row, factors: [f32; K], rows: [&Row; K]) {
     for (block, to) in to.iter_mut().enumerate().skip(FIRST) {
         let mut sum = *to;
-        // Not `Lanes::plus`: picking the block of each row would be a call.
+        // Not `Lanes::plus`: collecting the block of each row would compile to a call.
         for (factor, row) in factors.into_iter().zip(rows) {
-            // Always there, which compilers see only when they optimise for speed alone.
+            // Always `Some`; `if let` avoids a bounds check with a panic at every optimisation
+            // level.
             if let Some(lanes) = row.get(block) {
                 sum = sum + lanes.times(factor);
             }
@@ -50,7 +53,7 @@ fn add_rows<const FIRST: usize, const K: usize>(to: &mut Row, factors: [f32; K],
     }
 }
 
-/// Block and place in it of a state.
+/// Block of a state and its index in that block.
 #[inline(always)]
 const fn place(state: usize) -> (usize, usize) {
     (state / 3, state % 3)
@@ -67,7 +70,7 @@ impl Covariance {
         covariance
     }
 
-    /// The same in its place, whatever is in it.
+    /// Does in place what [`from_sigmas`](Self::from_sigmas) does; all covariances become zero.
     pub(crate) fn set_sigmas(&mut self, sigmas: [f32; 5]) {
         for (block, (rows, sigma)) in self.rows.iter_mut().zip(sigmas).enumerate() {
             for (axis, row) in rows.iter_mut().enumerate() {
@@ -77,7 +80,7 @@ impl Covariance {
         }
     }
 
-    /// One element. Out of range is zero.
+    /// One element. Zero for an index out of range.
     #[inline]
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> f32 {
@@ -85,7 +88,7 @@ impl Covariance {
         self.rows.get(i).and_then(|rows| rows[k].get(j)).map_or(0.0, |lanes| lanes.get(l))
     }
 
-    /// Changes one element. Out of range there is none.
+    /// Changes one element. Ignored for an index out of range.
     #[inline(always)]
     fn change(&mut self, row: usize, column: usize, change: impl FnOnce(f32) -> f32) {
         let ((i, k), (j, l)) = (place(row), place(column));
@@ -103,7 +106,7 @@ impl Covariance {
         }
     }
 
-    /// Inflates the variance of one state by `variance`.
+    /// Adds `variance` to the variance of one state.
     pub fn inflate(&mut self, state: usize, variance: f32) {
         self.change(state, state, |before| before + variance);
     }
@@ -116,8 +119,7 @@ impl Covariance {
         })
     }
 
-    /// Is every element finite and no variance negative?
-    // Asked once in a hundred steps.
+    /// Whether every element is finite and no variance is negative.
     #[inline(never)]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
@@ -125,7 +127,7 @@ impl Covariance {
         sum.is_finite() && self.variances().all(|variance| variance >= 0.0)
     }
 
-    /// Copies the upper triangle, which was computed, to the lower one, of the first `COLUMNS` block columns.
+    /// Copies the upper triangle to the lower one, for the first `COLUMNS` block columns.
     #[inline(always)]
     fn mirror<const COLUMNS: usize>(&mut self) {
         for i in 0..COLUMNS {

@@ -1,30 +1,32 @@
-//! The inertial samples of the last tenth of a second, to go back to the time of a late measurement.
+//! The motion of the last tenth of a second, to reconstruct the state at the time of a late
+//! measurement.
 //!
-//! A flow sensor reports what it saw a picture or two ago, a camera system what it saw fifty milliseconds ago. This
-//! ring keeps how the body turned and what its specific force added, not states: a correction of the present state
-//! is a correction of the past ones, too, without touching them. (Velocity changes keep the attitude they were added
-//! with: a correction by θ leaves an error of θ times the change until they are forgotten.) Samples that come faster
-//! than every 2.5 ms are merged, so the memory reaches back [`MAX_AGE`] at any rate of the inertial sensor.
+//! A flow sensor reports one or two frames late, a camera system about 50 ms late. The ring stores
+//! rotation and velocity changes, not states, so that a correction of the present state also
+//! corrects the past ones without touching the ring. (Velocity changes keep the attitude with which
+//! they were added: a correction by θ leaves an error of θ times the change until they are
+//! dropped.) Samples faster than 2.4 ms are merged, so the ring covers [`MAX_AGE`] at any sample
+//! rate.
 //!
-//! For a satellite receiver that is 300 ms late, [`History::reaching`] makes one that reaches farther in the same 2.1 kB: it
-//! merges more. Within what is merged, rate and force count as constant.
+//! For a satellite receiver that is 300 ms late, [`History::reaching`] covers a longer time in the
+//! same 2.1 kB by merging more. Within a merged interval, rate and force count as constant.
 //!
-//! | reaches back | bytes | merges up to | for |
-//! |---|---|---|---|
-//! | 0.1 s | 2.1 kB | 2.4 ms | flow, cameras |
-//! | 0.3 s | 2.1 kB | 6.5 ms | receivers at 10 Hz and more, slow turns between flow samples |
-//! | 0.5 s | 2.1 kB | 11 ms | any receiver; flow loses the turn within a picture |
+//! | horizon | merges up to | use |
+//! |---|---|---|
+//! | 0.1 s | 2.4 ms | flow, cameras |
+//! | 0.3 s | 6.5 ms | receivers at 10 Hz and more, slow turns between flow samples |
+//! | 0.5 s | 11 ms | any receiver; rotation within a frame is lost for flow |
 
 use super::PropagationStep;
 use super::state::{Motion, Rotation, conjugate, multiply, normalize, rotate, small_rotation};
 use stampfly_types::Vec3;
 
-/// Largest age of a measurement that can be placed in time by a memory of the usual reach, s.
+/// Age that the default history covers, s.
 pub const MAX_AGE: f32 = 0.1;
-/// An interval shorter than this takes in the next sample, s. A little less than the 2.5 ms of 400 Hz, for clocks that
-/// run fast.
+/// Shortest interval, s; a shorter one takes in the next sample. Slightly less than the 2.5 ms of
+/// 400 Hz, for clocks that run fast.
 const MIN_INTERVAL: f32 = 2.4e-3;
-/// Intervals kept: with the one being filled they always reach back far enough.
+/// Number of intervals. All but the one being filled must cover [`MAX_AGE`].
 const DEPTH: usize = 48;
 const _: () = assert!((DEPTH - 1) as f32 * MIN_INTERVAL > MAX_AGE);
 
@@ -33,12 +35,12 @@ const _: () = assert!((DEPTH - 1) as f32 * MIN_INTERVAL > MAX_AGE);
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Interval {
     length: f32,
-    /// Mean rate without bias, body.
+    /// Mean rate without bias, body, rad/s.
     rate: Vec3,
-    /// How the body has turned from the first sample to the end of this interval. Of two of these comes the turn in between: no
-    /// product over the intervals.
+    /// Rotation from the first sample to the end of this interval. Two of them give the rotation in
+    /// between without a product over the intervals.
     turned: [f32; 4],
-    /// World.
+    /// World, m/s.
     delta_velocity: Vec3,
 }
 
@@ -49,12 +51,13 @@ const EMPTY: Interval = Interval {
     delta_velocity: Vec3::new(0.0, 0.0, 0.0),
 };
 
-/// What is merged by a memory that reaches back so far, s. It holds one interval less than it could: the newest is being filled.
+/// Shortest interval of a history that covers `horizon`, s. One interval of the ring is still being
+/// filled.
 fn merged(horizon: f32) -> f32 {
     MIN_INTERVAL.max(horizon / (DEPTH - 2) as f32)
 }
 
-/// The last tenth of a second. See the [module](self) documentation.
+/// Ring of the most recent motion. See the [module](self) documentation.
 ///
 /// ```
 /// use stampfly_eskf::filter::{History, NominalState};
@@ -63,7 +66,7 @@ fn merged(horizon: f32) -> f32 {
 /// for _ in 0..10 {
 ///     history.add(&state.propagate(&Vec3::new(0.0, 0.0, -9.80665), &Vec3::x(), 0.0025));
 /// }
-/// // 20 ms ago it had turned by five milliradians.
+/// // 20 ms ago the body had turned 5 mrad.
 /// let then = history.since(0.02).unwrap().state_at_start(&state);
 /// assert!((then.quat().angle() - 0.005).abs() < 1e-5);
 /// assert!((history.mean_rate(0.0, 0.01).unwrap() - Vec3::x()).amax() < 1e-5);
@@ -73,7 +76,7 @@ fn merged(horizon: f32) -> f32 {
 pub struct History {
     #[cfg_attr(feature = "serde", serde(with = "stored::intervals"))]
     intervals: [Interval; DEPTH],
-    /// An interval shorter than this takes in the next sample, s.
+    /// Shortest interval, s; a shorter one takes in the next sample.
     merged: f32,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "stored::place"))]
     newest: usize,
@@ -86,10 +89,11 @@ impl Default for History {
 }
 
 impl History {
-    /// No sample. A constant, because a filter that is made on a small stack has no room for two of them.
+    /// An empty history. A constant, because a small stack has no room for a temporary one.
     pub(crate) const EMPTY: Self = Self { intervals: [EMPTY; DEPTH], merged: MIN_INTERVAL, newest: 0 };
 
-    /// An empty memory that reaches back `horizon` seconds, 0.1 at least. A longer one is as large and coarser.
+    /// An empty history that covers `horizon` seconds, at least 0.1. A longer one has the same size
+    /// and is coarser.
     ///
     /// ```
     /// use stampfly_eskf::filter::{History, NominalState};
@@ -107,19 +111,19 @@ impl History {
         Self { merged: merged(horizon), ..Self::EMPTY }
     }
 
-    /// The same in its place.
+    /// Does in place what [`reaching`](Self::reaching) does.
     pub(crate) fn reach(&mut self, horizon: f32) {
         self.clear();
         self.merged = merged(horizon);
     }
 
-    /// Forgets all samples.
+    /// Drops all samples.
     pub fn clear(&mut self) {
         self.intervals.fill(EMPTY);
         self.newest = 0;
     }
 
-    /// Turns what was gained about the world's vertical, after the heading has been set: what was kept points elsewhere now.
+    /// Rotates the stored velocity changes in the world, after the heading has been set.
     pub(crate) fn turn(&mut self, rotation: &Rotation) {
         for interval in &mut self.intervals {
             interval.delta_velocity = rotate(rotation, &interval.delta_velocity);
@@ -146,7 +150,7 @@ impl History {
         }
     }
 
-    /// Newest first.
+    /// Filled intervals, newest first.
     #[inline]
     fn backwards(&self) -> impl Iterator<Item = &Interval> {
         let all = (&self.intervals[..], &[][..]);
@@ -154,8 +158,8 @@ impl History {
         older.iter().rev().chain(newer.iter().rev()).take_while(|interval| interval.length > 0.0)
     }
 
-    /// The step over the last `age` seconds; for a negative age, the last motion extrapolated. `None` when the history
-    /// does not go back so far.
+    /// The step over the last `age` seconds; for a negative age, an extrapolation of the last
+    /// motion. `None` when the history does not reach back so far.
     #[inline]
     #[must_use]
     pub fn since(&self, age: f32) -> Option<PropagationStep> {
@@ -174,22 +178,22 @@ impl History {
         None
     }
 
-    /// How the body has turned since the first sample.
+    /// Rotation from the first sample to the present.
     #[inline]
     fn turned(&self) -> [f32; 4] {
         self.intervals.get(self.newest).unwrap_or(&EMPTY).turned
     }
 
-    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, as far as the history covers
-    /// them.
-    /// `None` when it covers no part of them.
+    /// Mean rate without bias over the `length` seconds that ended `age` seconds ago, body, rad/s,
+    /// over the part that the history covers. `None` when it covers no part.
     #[inline]
     #[must_use]
     pub fn mean_rate(&self, age: f32, length: f32) -> Option<Vec3> {
         let (mut sum, mut time, mut end) = (Vec3::zeros(), 0.0, 0.0f32);
         for interval in self.backwards() {
             let begin = end + interval.length;
-            // Compared by hand: `min` and `max` are calls on cores whose FPU has neither.
+            // Comparisons instead of `min` and `max`, which are calls on cores whose FPU has
+            // neither.
             let from = if end > age { end } else { age };
             let to = if begin < age + length { begin } else { age + length };
             let overlap = to - from;
@@ -206,14 +210,14 @@ impl History {
     }
 }
 
-/// What serde does not derive.
+/// Serialisation that serde does not derive.
 #[cfg(feature = "serde")]
 mod stored {
     use super::{DEPTH, EMPTY, Interval};
     use core::fmt;
     use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 
-    /// The index of an interval; any other number is refused.
+    /// Index of an interval; a number out of range is an error.
     pub fn place<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let place = usize::deserialize(deserializer)?;
         if place < DEPTH { Ok(place) } else { Err(D::Error::custom("beyond the memory of the last tenth of a second")) }
@@ -261,7 +265,8 @@ mod tests {
     use approx::assert_abs_diff_eq;
     use proptest::prelude::*;
 
-    /// A rate that grows evenly, 1 rad/s², sampled at this rate: the state, its history and the time after about 0.3 s.
+    /// Uniform angular acceleration of 1 rad/s², sampled at `rate`: state, history and time after
+    /// about 0.3 s.
     fn spun_up(rate: f32) -> (NominalState, History, f32) {
         let (mut state, mut history) = (NominalState::default(), History::default());
         let dt = 1.0 / rate;
@@ -294,7 +299,7 @@ mod tests {
             let (_, history, now) = spun_up(400.0);
             let expected = now - age - 0.5 * length;
             let mean = history.mean_rate(age, length).expect("covered").x;
-            // Inside a step the rate is taken as constant.
+            // Within a step the rate counts as constant.
             prop_assert!((mean - expected).abs() < 0.0013, "{mean}, not {expected}");
         }
     }

@@ -1,28 +1,30 @@
-//! Three numbers side by side: a row of a 3 × 3 block, in a vector register where there is one.
+//! Three numbers: a row of a 3 × 3 block, in a vector register where available.
 //!
-//! The covariance is made of them. On x86-64 and AArch64 they are a register of four, whose last lane stays zero: compilers that find
-//! the vectors by themselves join two rows where registers are wider, read what was just written in halves, and wait for it
-//! (four times as slow with `target-cpu=native`). Elsewhere they are an array of three. Both give the same bits: no sum changes
-//! its order, and nothing is fused.
+//! On x86-64 and AArch64 they are a register of four whose last lane stays zero. Without it, an
+//! auto-vectorising compiler joins two rows where registers are wider, then reads in halves what
+//! was just written and stalls on it (four times slower with `target-cpu=native`). Elsewhere they
+//! are an array of three. Both give the same bits: the order of sums is fixed and no multiplication
+//! is fused with an addition.
 //!
-//! Not for vectors of the estimate: those are [`Vec3`](stampfly_types::Vec3).
+//! Only for the covariance. Vectors of the estimate are [`Vec3`](stampfly_types::Vec3).
 
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub use array::Lanes;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub use register::Lanes;
 
-/// Are there vector registers? Then a whole row costs less than the half of it that is needed.
+/// Whether vector registers are used. A whole row then costs less than the half of it that is
+/// needed.
 pub const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
 impl Lanes {
-    /// A number, 0 to 2. Beyond them it is zero.
+    /// Lane 0 to 2; zero for others.
     #[inline(always)]
     pub fn get(self, lane: usize) -> f32 {
         self.to_array().get(lane).copied().unwrap_or(0.0)
     }
 
-    /// Replaces a number.
+    /// Replaces a lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, value: f32) {
         let mut all = self.to_array();
@@ -32,7 +34,7 @@ impl Lanes {
         *self = Self::new(all);
     }
 
-    /// Plus multiples of others, one after the other.
+    /// Adds multiples of other rows, in sequence.
     #[inline(always)]
     pub fn plus<const K: usize>(self, factors: [f32; K], others: [&Self; K]) -> Self {
         factors.into_iter().zip(others).fold(self, |sum, (factor, other)| sum + other.times(factor))
@@ -81,26 +83,26 @@ mod register {
     pub struct Lanes(f32x4);
 
     impl Lanes {
-        /// All zero.
+        /// All lanes zero.
         #[inline(always)]
         pub fn zero() -> Self {
             Self(f32x4::ZERO)
         }
 
-        /// These three.
+        /// From an array.
         #[inline(always)]
         pub fn new([x, y, z]: [f32; 3]) -> Self {
             Self(f32x4::new([x, y, z, 0.0]))
         }
 
-        /// The three.
+        /// To an array.
         #[inline(always)]
         pub fn to_array(self) -> [f32; 3] {
             let [x, y, z, _] = self.0.to_array();
             [x, y, z]
         }
 
-        /// A multiple.
+        /// Multiple by a scalar.
         #[inline(always)]
         pub fn times(self, factor: f32) -> Self {
             Self(f32x4::splat(factor) * self.0)
@@ -126,25 +128,25 @@ mod array {
     pub struct Lanes([f32; 3]);
 
     impl Lanes {
-        /// All zero.
+        /// All lanes zero.
         #[inline(always)]
         pub fn zero() -> Self {
             Self([0.0; 3])
         }
 
-        /// These three.
+        /// From an array.
         #[inline(always)]
         pub fn new(values: [f32; 3]) -> Self {
             Self(values)
         }
 
-        /// The three.
+        /// To an array.
         #[inline(always)]
         pub fn to_array(self) -> [f32; 3] {
             self.0
         }
 
-        /// A multiple.
+        /// Multiple by a scalar.
         #[inline(always)]
         pub fn times(mut self, factor: f32) -> Self {
             for lane in &mut self.0 {
@@ -177,7 +179,7 @@ mod tests {
         fn array_and_register_give_the_same_bits(a in any::<[f32; 3]>(), b in any::<[f32; 3]>(), factor in any::<f32>()) {
             let one = register::Lanes::new(a) + register::Lanes::new(b).times(factor);
             let other = array::Lanes::new(a) + array::Lanes::new(b).times(factor);
-            // What is no number has many forms.
+            // NaN has many bit patterns: compare them as one.
             let bits = |lanes: [f32; 3]| lanes.map(|v| if v.is_nan() { u32::MAX } else { v.to_bits() });
             prop_assert_eq!(bits(one.to_array()), bits(other.to_array()));
             prop_assert_eq!(bits(register::Lanes::zero().to_array()), bits(array::Lanes::zero().to_array()));

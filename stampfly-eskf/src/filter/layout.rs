@@ -1,6 +1,6 @@
-//! The error states: how many there are, and where each kind begins. Each kind has three, one for each axis of its frame.
+//! Indices of the error states. Each kind of state has three, one per axis of its frame.
 //!
-//! Use these instead of numbers wherever a Jacobian or a correction is filled or read.
+//! Use these constants instead of literals wherever a Jacobian or a correction is written or read.
 
 /// Number of error states.
 pub const N: usize = 15;

@@ -1,19 +1,21 @@
-//! The arithmetic of an error-state Kalman filter with fifteen states, and nothing else: no sensors, no gates.
+//! Arithmetic of a fifteen-state error-state Kalman filter, without sensors and gates.
 //!
-//! Error states, in order: position (world), velocity (world), attitude (body, right perturbation), gyro bias,
-//! accelerometer bias. The nominal state is `position`, `velocity`, a quaternion and the two biases. Equations: Solà,
-//! "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 7, for errors in the
-//! body frame.
+//! Use it to build a filter of your own; [`Eskf`](crate::Eskf) is the complete estimator.
 //!
-//! | file | what |
+//! Error states, in order: position (world), velocity (world), attitude (body, right perturbation),
+//! gyro bias, accelerometer bias. The nominal state holds position, velocity, a quaternion and the
+//! two biases. Equations: Solà, "Quaternion kinematics for the error-state Kalman filter",
+//! arXiv:1711.02508, sections 5 and 7, for errors in the body frame.
+//!
+//! | file | content |
 //! |---|---|
-//! | `lanes.rs` | three numbers in a vector register, where there is one |
-//! | [`layout`] | number and places of the error states |
+//! | `lanes.rs` | three numbers, in a vector register where available |
+//! | [`layout`] | number and indices of the error states |
 //! | [`state`] | nominal state, small rotations, injection of a correction |
 //! | [`covariance`] | storage, propagation, update |
-//! | [`vibration`] | how much the inertial signals change between samples, which adds to the process noise |
-//! | [`propagation`] | inertial samples between two instants, pre-integrated: how errors move, and how to go back |
-//! | [`history`] | the last tenth of a second, for measurements that are late |
+//! | [`vibration`] | sample-to-sample change of the inertial signals, added to the process noise |
+//! | [`propagation`] | pre-integrated inertial samples: error propagation, and the way back in time |
+//! | [`history`] | motion of the last tenth of a second, for late measurements |
 
 pub mod covariance;
 pub mod history;

@@ -1,16 +1,16 @@
-//! Propagation over the time between two instants, from the inertial samples in it.
+//! Propagation between two instants, from the inertial samples in between.
 //!
-//! Pre-integration (Forster et al., "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", IEEE TRO
-//! 33(1), 2017) in its smallest form: how far the body turned, and what its specific force added to velocity and
-//! position. Two things need it. The covariance is propagated over a few inertial samples at once. And a measurement
-//! that is late is compared with the state of its own time: the present state and the step since give the state of
-//! that time ([`PropagationStep::state_at_start`]) and the Jacobian by the present errors
-//! ([`PropagationStep::propagate_jacobians`]).
+//! Pre-integration (Forster et al., "On-Manifold Preintegration for Real-Time Visual-Inertial
+//! Odometry", IEEE TRO 33(1), 2017) in its smallest form: the rotation of the body, and the
+//! integrals of its specific force. It has two uses. The covariance is propagated over several
+//! inertial samples at once. And a late measurement is compared with the state at its own time: the
+//! present state and the step since then give that state ([`PropagationStep::state_at_start`]) and
+//! the Jacobian by the present errors ([`PropagationStep::propagate_jacobians`]).
 //!
-//! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the attitude at the
-//! beginning:
+//! With τ the duration, s `delta_velocity`, r `delta_position`, ΔR `delta_rotation` and R the
+//! attitude at the start:
 //!
-//! | at the beginning | from the end, "now" |
+//! | at the start | from the end, "now" |
 //! |---|---|
 //! | attitude | R = R(now)·ΔRᵀ |
 //! | velocity | v = v(now) − s − g·τ |
@@ -19,24 +19,25 @@
 //! | δv | δv(now) + \[s\]×·R·δθ + τ·R·δb_a |
 //! | δp | δp(now) − τ·δv + \[r\]×·R·δθ + τ²/2·R·δb_a |
 //!
-//! What is neglected: that a bias acts along the changing, not the first, attitude, and the process noise of the
-//! step itself. Within a tenth of a second both are far below any sensor's noise.
+//! Neglected: a bias acts along the changing attitude, not the first one, and the process noise of
+//! the step. Within a tenth of a second both are far below any sensor's noise.
 
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 use super::state::{Motion, NominalState, Rotation, conjugate, multiply, rotate_back, rotation_matrix};
 use stampfly_types::{GRAVITY, Vec3};
 
-/// The inertial samples between two instants, pre-integrated. See the [module](self) documentation.
+/// Pre-integrated inertial samples between two instants. See the [module](self) documentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PropagationStep {
     /// Duration τ, s. Negative for an extrapolation.
     pub duration: f32,
-    /// Rotation of the body, as w, x, y, z: attitude at the end = attitude at the beginning ⊗ delta_rotation.
+    /// Rotation of the body, as w, x, y, z: attitude at the end = attitude at the start ⊗
+    /// delta_rotation.
     pub delta_rotation: [f32; 4],
-    /// Integral s of the specific force, world, m/s: the change of velocity without gravity's part.
+    /// Integral s of the specific force, world, m/s: the velocity change without gravity.
     pub delta_velocity: Vec3,
-    /// Integral r of that, world, m: the change of position without the first velocity's and gravity's parts.
+    /// Double integral r, world, m: the position change without the initial velocity and gravity.
     pub delta_position: Vec3,
 }
 
@@ -57,7 +58,7 @@ impl PropagationStep {
     pub fn extend(&mut self, motion: &Motion) {
         self.delta_position += (self.delta_velocity + motion.delta_velocity * 0.5) * motion.dt;
         self.delta_velocity += motion.delta_velocity;
-        // The first turn is the whole.
+        // Saves a product: the first rotation is the whole one.
         self.delta_rotation = if self.duration == 0.0 {
             motion.delta_rotation
         } else {
@@ -66,8 +67,8 @@ impl PropagationStep {
         self.duration += motion.dt;
     }
 
-    /// Prepends an interval of constant force: `length` seconds in which the body gained `delta_velocity`. How it turned is
-    /// the caller's to say.
+    /// Prepends an interval of constant force: `length` seconds with a velocity change of
+    /// `delta_velocity`. The caller sets the rotation.
     #[inline]
     pub(crate) fn prepend(&mut self, length: f32, delta_velocity: Vec3) {
         self.delta_position += delta_velocity * (self.duration + 0.5 * length);
@@ -75,7 +76,7 @@ impl PropagationStep {
         self.duration += length;
     }
 
-    /// The state at the beginning of a step that ends in the state `now`.
+    /// The state at the start of a step that ends in the state `now`.
     #[inline]
     #[must_use]
     pub fn state_at_start(&self, now: &NominalState) -> NominalState {
@@ -90,8 +91,8 @@ impl PropagationStep {
         }
     }
 
-    /// Jacobians by the errors at the beginning become Jacobians by the errors at the end. `rotation` is the attitude
-    /// at the beginning.
+    /// Converts Jacobians by the errors at the start into Jacobians by the errors at the end.
+    /// `rotation` is the attitude at the start.
     #[inline(always)]
     pub fn propagate_jacobians(&self, rotation: &Rotation, jacobians: &mut [[f32; N]]) {
         let turn = rotation_matrix(self.delta_rotation);
@@ -146,8 +147,8 @@ mod tests {
             }
         }
 
-        /// The propagated Jacobian is the derivative of "go back, then measure". Biases change what the inertial
-        /// samples meant, so they are moved before the flight, not after.
+        /// The propagated Jacobian is the derivative of "go back, then measure". Biases affect the
+        /// inertial samples, so they are changed before the flight, not after it.
         #[test]
         fn propagated_jacobian_matches_numerical_differentiation(
             samples in prop::collection::vec((-2f32..2.0, -2f32..2.0, -2f32..2.0, -3f32..3.0), 1..40),
@@ -165,7 +166,8 @@ mod tests {
                     by[i] = sign * delta;
                     let mut moved = last;
                     moved.correct(&by);
-                    // An error of the attitude now is one of the whole step: it rotates what was gained, too.
+                    // An attitude error at the end rotates the whole step, including its velocity
+                    // change.
                     let mut turned = step;
                     let rotation = multiply(moved.attitude, conjugate(last.attitude));
                     let rotation = rotation_matrix(rotation);
@@ -176,7 +178,7 @@ mod tests {
                 let numeric = (shifted(1.0) - shifted(-1.0)) / (2.0 * delta);
                 prop_assert!((numeric - stated).abs() < 3e-3, "state {i}: numeric {numeric}, stated {stated}");
             }
-            // A bias changes every sample, so it is applied from the beginning.
+            // A bias affects every sample, so it is applied from the start.
             for i in GYRO_BIAS..N {
                 let delta = 2e-2;
                 let shifted = |sign: f32| {

@@ -1,9 +1,10 @@
-//! The nominal state and how it moves.
+//! The nominal state, its propagation by inertial samples and its correction; quaternion and
+//! rotation helpers.
 
 use super::layout::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, N, POSITION, VELOCITY};
 use stampfly_types::{GRAVITY, Quat, Vec3};
 
-/// The nominal state: the estimate, without its covariance.
+/// The nominal state: the estimate without its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NominalState {
@@ -31,14 +32,15 @@ impl Default for NominalState {
     }
 }
 
-/// No vehicle turns so far between two samples, and no measurement turns an estimate so far, rad. The powers of much larger ones overflow:
-/// covariances that contradict one another make such corrections.
+/// Rotations by this angle or more are ignored, rad. No vehicle turns so far between two samples,
+/// and no valid measurement corrects so far. Covariances that contradict each other produce such
+/// corrections, whose powers overflow.
 pub const FARTHEST_TURN: f32 = 1e4;
 
 /// A rotation matrix in row order, body → world.
 pub type Rotation = [[f32; 3]; 3];
 
-/// The motion of one inertial sample: the covariance and the history are propagated with the same numbers.
+/// Motion over one inertial sample. Covariance and history are propagated with the same numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Specific force without bias, body, m/s².
@@ -54,8 +56,8 @@ pub struct Motion {
 }
 
 impl NominalState {
-    /// Propagates the state by one inertial sample: attitude by half a step, velocity and position with that attitude,
-    /// attitude by the other half. Second order in `dt`.
+    /// Propagates the state by one inertial sample: half the rotation, then velocity and position
+    /// with that attitude, then the other half. Second order in `dt`.
     #[inline]
     pub fn propagate(&mut self, accel: &Vec3, gyro: &Vec3, dt: f32) -> Motion {
         let force = accel - self.accel_bias;
@@ -71,7 +73,7 @@ impl NominalState {
         Motion { force, rate, delta_rotation, delta_velocity, dt }
     }
 
-    /// Adds an error-state correction to the nominal state.
+    /// Applies an error-state correction.
     #[inline]
     pub fn correct(&mut self, correction: &[f32; N]) {
         let at = |first: usize| Vec3::new(correction[first], correction[first + 1], correction[first + 2]);
@@ -89,7 +91,7 @@ impl NominalState {
         rotation_matrix(self.attitude)
     }
 
-    /// Cosine of the tilt: the world's down seen along the body's.
+    /// Cosine of the tilt, the angle between body z and world down.
     #[inline]
     #[must_use]
     pub fn cos_tilt(&self) -> f32 {
@@ -104,7 +106,7 @@ impl NominalState {
         Quat::new_unchecked(w, x, y, z)
     }
 
-    /// Is every number finite?
+    /// Whether every number is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         let sum = self.position.sum() + self.velocity.sum() + self.gyro_bias.sum() + self.accel_bias.sum();
@@ -112,7 +114,7 @@ impl NominalState {
     }
 }
 
-/// World = matrix · body.
+/// Body to world: matrix · body.
 #[inline]
 #[must_use]
 pub fn rotate(rotation: &Rotation, body: &Vec3) -> Vec3 {
@@ -120,7 +122,7 @@ pub fn rotate(rotation: &Rotation, body: &Vec3) -> Vec3 {
     Vec3::new(row(&rotation[0]), row(&rotation[1]), row(&rotation[2]))
 }
 
-/// Body = matrixᵀ · world.
+/// World to body: matrixᵀ · world.
 #[inline]
 #[must_use]
 pub fn rotate_back(rotation: &Rotation, world: &Vec3) -> Vec3 {
@@ -128,7 +130,7 @@ pub fn rotate_back(rotation: &Rotation, world: &Vec3) -> Vec3 {
     Vec3::new(column(0), column(1), column(2))
 }
 
-/// World = quaternion · body · conjugate: for one vector cheaper than the matrix.
+/// Rotates a vector by a unit quaternion; cheaper than the matrix for a single vector.
 #[inline]
 fn turn_by([w, x, y, z]: [f32; 4], body: &Vec3) -> Vec3 {
     let axis = Vec3::new(x, y, z);
@@ -159,16 +161,16 @@ pub fn multiply(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     ]
 }
 
-/// The other way round, for a unit quaternion.
+/// The inverse rotation of a unit quaternion.
 #[inline]
 #[must_use]
 pub(crate) fn conjugate([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     [w, -x, -y, -z]
 }
 
-/// The quaternion of a rotation vector, by its series to fourth order: exact to `f32` below 0.3 rad, and brought back to unit length
-/// beyond 1 rad, where the series is no rotation. A turn by [`FARTHEST_TURN`] or more is none: it stays where it is. No transcendental in
-/// the 400 Hz path.
+/// Quaternion of a rotation vector, by a fourth-order series without transcendentals. Exact to
+/// `f32` below 0.3 rad; normalised beyond 1 rad, where the series is no longer a rotation. The
+/// identity for [`FARTHEST_TURN`] or more.
 #[inline]
 #[must_use]
 pub fn small_rotation(turn: Vec3) -> [f32; 4] {
@@ -182,18 +184,18 @@ pub fn small_rotation(turn: Vec3) -> [f32; 4] {
     } else if square >= 0.25 * FARTHEST_TURN * FARTHEST_TURN {
         [1.0, 0.0, 0.0, 0.0]
     } else {
-        // Its length would multiply the covariance. What is no number comes here, too, and stays none.
+        // The length would scale the covariance. NaN also takes this branch and stays NaN.
         normalize(series)
     }
 }
 
-/// The same rotation twice, for a unit quaternion.
+/// The square of a unit quaternion: the same rotation twice.
 #[inline]
 fn twice([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     [2.0 * w * w - 1.0, 2.0 * w * x, 2.0 * w * y, 2.0 * w * z]
 }
 
-/// One Newton step towards unit length; falls back to a square root when far away.
+/// Normalises to unit length: a second-order series close to it, a square root otherwise.
 #[inline]
 pub(crate) fn normalize(q: [f32; 4]) -> [f32; 4] {
     let square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -209,7 +211,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
     use proptest::prelude::*;
 
-    /// Of turns, rad.
+    /// Sizes of rotations, rad.
     const SIZES: &[f32] = &[1e-10, 1e-3, 0.5, 1.0, 3.0, 30.0, 1e3, 1e4, 1e10, 1e19, 1e30, 1e38];
 
     proptest! {
@@ -222,7 +224,7 @@ mod tests {
             }
         }
 
-        /// Whatever covariances that contradict one another make of an innovation.
+        /// Corrections of any size, as contradicting covariances produce them.
         #[test]
         fn any_correction_leaves_a_rotation(x in any::<f32>(), y in any::<f32>(), z in any::<f32>(), size in prop::sample::select(SIZES)) {
             prop_assume!(x.is_finite() && y.is_finite() && z.is_finite());

@@ -1,19 +1,19 @@
 //! Vibration of the inertial signals, measured as their change from sample to sample.
 //!
-//! A sample stands for the interval until the next. Where the signal changes by Δ from one to the next, that is
-//! wrong by some share of Δ: vibration, aliasing, a jerk, the samples that a logger left out. So the noise that drives
-//! the filter is the sensor's own plus a share of what the signal is doing, and one tuning serves a vehicle that
-//! stands, one that is carried and one whose propellers are out of balance.
+//! A sample represents the interval until the next one. If the signal changes by Δ between them,
+//! the integral is wrong by a share of Δ, be it from vibration, aliasing, a jerk or samples that a
+//! logger dropped. The process noise is therefore the sensor's own plus a share of this change, and
+//! one tuning serves a vehicle at rest, one carried by a person and one with unbalanced propellers.
 //!
-//! Not a noise estimate for its own sake: a slow, smooth manoeuvre leaves it where it is.
+//! Not a general noise estimate: slow, smooth manoeuvres do not change it.
 
 use stampfly_types::Vec3;
 
-/// Time constant of the average, s: some samples, so that it is there when a jerk is, and a few periods of a
-/// propeller.
+/// Time constant of the average, s: a few samples, so that it reacts within a jerk, and a few
+/// propeller periods.
 const TIME_CONSTANT: f32 = 0.05;
 
-/// Mean square of a signal's change from sample to sample, per axis.
+/// Mean square of a signal's change from sample to sample, averaged over the axes.
 ///
 /// ```
 /// use stampfly_eskf::filter::Vibration;
@@ -33,7 +33,7 @@ pub struct Vibration {
 }
 
 impl Vibration {
-    /// Takes the next sample, `dt` seconds after the last.
+    /// Adds the next sample, `dt` seconds after the last.
     #[inline]
     pub fn add(&mut self, sample: &Vec3, dt: f32) {
         if let Some(last) = self.last.replace(*sample) {

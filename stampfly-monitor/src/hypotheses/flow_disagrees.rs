@@ -1,11 +1,11 @@
-//! Flow's velocity grows in another way than the one that is reckoned.
+//! Flow velocity deviates from dead reckoning.
 //!
-//! Its residual against a reckoner exceeds the gate, and a shift of the gyro's zero is not the better
-//! explanation ([`course`](crate::course)). Axes that are reversed, swapped or dead, and an offset
-//! from the take-off on, are found so.
+//! The residual against a reckoner exceeds the gate, and a shift of the gyro's zero is not the
+//! better explanation ([`course`](crate::course)). Detects reversed, swapped or dead axes, and an
+//! offset present since the take-off.
 //!
-//! Not for an error of scale within the spread of cameras, nor for an offset that was there before
-//! the reckoner began: no other sensor measures a constant velocity.
+//! Not for scale errors within the spread of cameras, nor for an offset that began before the
+//! reckoner: no other sensor measures a constant velocity.
 
 use crate::config::MonitorConfig;
 use crate::course::Explanation;
@@ -13,21 +13,21 @@ use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// A course that neither explains counts against the camera after this time, s: within it, a shift
-/// of the gyro's zero that has just begun has made a course of its own.
+/// Time after which an unexplained course counts as a camera fault, s. Within it, a shift of the
+/// gyro's zero that has just begun has developed its own course.
 const UNCLEAR: f32 = 0.3;
-/// The same where a shift explains it, and others nearly as well: their courses part later. And where
-/// it is a second shift within seconds.
+/// The same where a shift and another cause explain the course similarly well, because their
+/// courses diverge later; and where it would be a second shift within seconds.
 const PERHAPS_GYRO: f32 = 0.8;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowDisagrees {
-    /// How long the residual has exceeded the gate, s.
+    /// Time for which the residual has exceeded the gate, s.
     exceeds: f32,
-    /// It did since the vehicle stood. What agrees with later motions may be an offset, so this holds
-    /// until it stands again.
+    /// The fault was present when the vehicle last stood. Later agreement may be due to a constant
+    /// offset, so the finding is kept until the vehicle stands again.
     since_stood: bool,
 }
 

@@ -1,11 +1,12 @@
-//! The camera repeats one reading that is not zero: its registers are read, and it has stopped.
+//! The camera repeats one reading that is not zero: its registers can be read, but it has stopped
+//! measuring.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowFrozen {
@@ -22,7 +23,7 @@ impl Hypothesis for FlowFrozen {
         let repeats = flow.counts == self.reading && flow.counts != [0.0; 2];
         self.repeats = if repeats { self.repeats.saturating_add(1) } else { 0 };
         self.reading = flow.counts;
-        // On the ground nothing moves, and flow is not used.
+        // On the ground there is no motion, and flow is not used.
         if self.repeats >= config.flow_repeats && !seen.stands {
             Opinion::Holds(seen.back_to_before(self.repeats.saturating_add(1) as f32 * flow.interval))
         } else {

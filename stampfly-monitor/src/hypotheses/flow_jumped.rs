@@ -1,10 +1,10 @@
-//! Flow's velocity jumps.
+//! The flow velocity jumps.
 //!
-//! A body that changes its velocity by half a metre per second within a tenth of one feels it; an
-//! offset that begins does not. What it leaves agrees with every motion that follows, so flow that
-//! has jumped is not used again until the vehicle stands.
+//! The accelerometer measures a real change of velocity by half a metre per second within a tenth
+//! of a second, but not an offset that begins. With an offset flow still agrees with all later
+//! motion, so it is not used again until the vehicle stands.
 //!
-//! Not for an offset that grows, which is slower.
+//! Not for an offset that grows slowly.
 
 use crate::config::MonitorConfig;
 use crate::evidence::{Evidence, FlowReading};
@@ -13,38 +13,39 @@ use crate::reckoner::Reckoner;
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// Means of so many readings are compared with those two before: one of five holds two frames.
+/// Number of readings per mean. One reading in five holds two frames, so each mean contains one
+/// of them. A mean is compared with the one before the last.
 const BLOCK: u32 = 5;
-/// From the first reading of the earlier mean to the last of the later one, s.
+/// Time from the first reading of the earlier mean to the last of the later one, s.
 const SPAN: f32 = 0.15;
-/// The velocity has to stay there for so long, s: what a late picture makes of a fast turn is over by
-/// then, and a jump of the gyro's zero, which looks the same, is found and undone.
+/// Time for which the velocity must stay changed, s. A late frame in a fast turn is over by then,
+/// and a jump of the gyro's zero, which looks the same, has been found and corrected.
 const WAITS: f32 = 0.1;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowJumped {
-    /// Against each reckoner: one of them has always lasted for longer than a jump.
+    /// One per reckoner, because one of them is always older than a jump.
     against: [Means; 2],
-    /// Time since a jump, s.
+    /// Time since the jump, s.
     since: Option<f32>,
 }
 
-/// The last two means of [`BLOCK`] differences, and the sum of the next.
+/// The last two means of [`BLOCK`] differences, and the sum of the next one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Means {
     means: [[f32; 2]; 2],
     sum: [f32; 2],
-    /// Largest square of what single readings of each may be wrong by, (m/s)².
+    /// Largest variance of single readings in each, (m/s)².
     uncertain: [f32; 3],
     readings: u32,
-    /// Where it has jumped from, m/s, and what that was uncertain by, (m/s)².
+    /// Velocity before the jump, m/s, and its variance, (m/s)².
     from: Option<([f32; 2], f32)>,
     /// Age of the reckoner, s.
     age: f32,
-    /// Its variance by noise when the last three means began, oldest first, (m/s)².
+    /// Noise variance of the reckoner at the start of the last three means, oldest first, (m/s)².
     walk: [f32; 3],
 }
 
@@ -66,7 +67,7 @@ impl Hypothesis for FlowJumped {
             let mut is_away = false;
             for (index, means) in self.against.iter_mut().enumerate() {
                 let reckoner = seen.reckoners.get(index);
-                // As the filter has its tilt, and as the gyro's zero has moved it since.
+                // The initial tilt error and the effect of the gyro bias since then.
                 let tilted = (reckoner.tilted() + square(reckoner.drift())) * square(SPAN);
                 let noise = square(config.gate_sigmas) * (means.walked(reckoner) + reckoner.aside() + tilted);
                 means.step(index, flow, flow.uncertain + noise, limit);
@@ -76,14 +77,14 @@ impl Hypothesis for FlowJumped {
                 self.since = is_away.then(|| self.since.map_or(0.0, |time| time + flow.interval));
             }
         }
-        // It jumped within the span of the means, before one of them was away.
+        // The jump happened up to one span before it was visible in a mean.
         let ago = SPAN + self.since.unwrap_or_default();
         if has_jumped { Opinion::Holds(Some(seen.back_to(seen.last_before(ago)))) } else { Opinion::Unknown }
     }
 }
 
 impl Means {
-    /// Variance of the velocity that noise has added up to since the first mean began, (m/s)².
+    /// Variance accumulated from noise since the start of the first mean, (m/s)².
     fn walked(&mut self, reckoner: &Reckoner) -> f32 {
         if reckoner.age < self.age {
             self.walk = [0.0; 3];
@@ -94,8 +95,8 @@ impl Means {
         math::larger(reckoner.walk - self.walk[0], 0.0)
     }
 
-    /// Takes a reading. A mean that is away from an earlier one by more than `limit`, m/s, beyond what is
-    /// uncertain, (m/s)², has jumped from there, until one is not.
+    /// Takes a reading. A mean has jumped if it differs from an earlier one by more than `limit`,
+    /// m/s, and the variance `uncertain`, (m/s)²; the jump ends when a later mean does not.
     fn step(&mut self, index: usize, flow: &FlowReading, uncertain: f32, limit: f32) {
         let age = flow.ages.get(index).copied().unwrap_or_default();
         if age < core::mem::replace(&mut self.age, age) {
@@ -117,7 +118,7 @@ impl Means {
         let uncertain = self.uncertain.into_iter().fold(0.0, math::larger);
         let [_, last, now] = self.uncertain;
         self.uncertain = [last, now, 0.0];
-        // Before the third mean there is nothing to compare with.
+        // The first comparison is possible with the third mean.
         let before = self.from.or((self.readings >= 3 * BLOCK).then_some((first, uncertain)));
         self.from = before.filter(|(before, was)| {
             let [x, y] = [mean[0] - before[0], mean[1] - before[1]];

@@ -1,18 +1,18 @@
-//! The camera shows a motion below a vehicle that stands.
+//! The camera shows motion while the vehicle stands.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// A vehicle that turns faster, rad/s, is carried.
+/// Rate above which the vehicle counts as carried, rad/s.
 const TURNS: f32 = 0.5;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStanding {
-    /// Mean rate of the picture, rad/s.
+    /// Mean image rate, rad/s.
     rate: [f32; 2],
 }
 

@@ -1,8 +1,8 @@
-//! The camera shows no motion at all while the body turns below it.
+//! The camera shows no motion at all while the body turns.
 //!
-//! It is covered, or sees no features and does not say so. A picture can stand still over a body that
-//! turns only if the vehicle moves by turn times distance the other way. One that is carried does so
-//! by millimetres.
+//! It is covered, or has no features without reporting that. The image of a turning body can only
+//! stand still if the vehicle moves by rotation times distance in the opposite direction, which one
+//! carried by a person does by millimetres at most.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
@@ -10,13 +10,13 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStill {
-    /// Number of readings of nothing that are running.
+    /// Number of consecutive zero readings.
     zeros: u32,
-    /// How far the body has turned meanwhile, and at most, rad.
+    /// Rotation of the body since then, and its largest value, rad.
     turn: [f32; 2],
     turned: f32,
 }
@@ -43,7 +43,7 @@ impl Hypothesis for FlowStill {
         if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
             Opinion::Holds(seen.back_to_before(self.zeros as f32 * flow.interval))
         } else {
-            // What stands still agrees with nothing.
+            // Zero readings are no agreement with the motion.
             Opinion::Misfits
         }
     }

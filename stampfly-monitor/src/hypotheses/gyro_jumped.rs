@@ -1,18 +1,18 @@
-//! The gyro's zero jumps from one sample to the next.
+//! The gyro's zero jumps between two samples.
 //!
-//! Whoever controls the rate turns the body the other way: after a jump of 1 rad/s it lies on its side
-//! within a second. Until the camera's velocity has grown apart it is too late. At the jump itself it
-//! is clear whose it is: what a blow or a manoeuvre turns shows in the picture, too. So the rate of
-//! the picture that neither turning nor velocity explains is compared, before the jump and over some
-//! readings from then on.
+//! A rate controller turns the body against the jump: after one of 1 rad/s the vehicle lies on its
+//! side within a second. The camera's velocity diverges too late for that. At the jump itself the
+//! cause is visible: a real rotation, from a blow or a manoeuvre, also appears in the image. The
+//! image rate that neither rotation nor velocity explains is therefore compared before the jump and
+//! over some readings after it.
 //!
-//! | where | the gyro's zero has jumped when |
-//! |---|---|
-//! | above 0.15 m | the picture does not share it |
-//! | standing, or leaving the floor | the picture does not share it, or no blow is felt with it: a tilt about a leg leaves the picture where it is |
-//! | elsewhere below 0.15 m | never: landing makes jumps, and an error of the velocity looks like a rate |
+//! - **Above 0.15 m**: the zero has jumped if the image does not show the rotation.
+//! - **Standing or leaving the floor**: if the image does not show the rotation, or the
+//!   accelerometer measures no blow. Tilting about a leg leaves the image unchanged.
+//! - **Elsewhere below 0.15 m**: never. A landing causes jumps, and a velocity error looks like a
+//!   rotation.
 //!
-//! Not for a zero that drifts, nor for the yaw rate, which a picture in its middle does not show.
+//! Not for a drifting zero, nor for the yaw rate, which the centre of the image does not show.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
@@ -20,68 +20,69 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::{EstimateCorrection, Finding, ImuData};
 use stampfly_types::{Duration, Instant, Stamped, Vec3, math};
 
-/// Readings that are compared: 50 ms, in which a jump of 1 rad/s makes a tilt of 3°, and twice
-/// as many for a jump that is smaller than this, rad/s: its share of a reading's noise is larger.
+/// Number of readings compared: 50 ms, in which a jump of 1 rad/s causes 3° of tilt. Twice as many
+/// for a jump below `SMALL`, rad/s, whose ratio to the noise of a reading is smaller.
 const READINGS: u32 = 5;
 const SMALL: f32 = 0.6;
-/// If there are not as many after this time, nothing is found.
+/// Time after which an examination with too few readings is dropped.
 const PATIENCE: Duration = Duration::from_millis(170);
 /// Time constant of the mean before a jump, s.
 const BEFORE: f32 = 0.2;
-/// Share of the jump that the picture has to lack along the jump's direction, and may lack across: a
-/// reading of 10 ms is uncertain by 0.2 rad/s, and one that holds a frame too much by 65 % of its rate.
+/// Share of the jump that the image must miss along the direction of the jump, and may miss across
+/// it. A reading of 10 ms has an error of 0.2 rad/s, and one with an extra frame 65 % of its rate.
 const ALONG: core::ops::Range<f32> = 0.6..1.5;
 const ACROSS: f32 = 0.6;
-/// A jump happens within a sample: the changes before and after it are smaller than this share of it,
-/// and do not make as much of it together, along it. Torque takes a motor's time and makes a ramp.
+/// A jump happens within one sample: the changes before and after it are smaller than `FLAT` of it,
+/// and together smaller than `RAMP` along it. Torque acts over the time constant of a motor and
+/// makes a ramp.
 const FLAT: f32 = 0.5;
 const RAMP: f32 = 0.4;
-/// A blow that turns a vehicle on a leg changes the specific force by more than this for each rad/s,
-/// m/s²: the leg is 3 cm away, and 3 cm/s in 2.5 ms are 12 m/s².
+/// Change of the specific force by a blow that turns a vehicle on its leg, m/s² per rad/s. The leg
+/// is 3 cm away, and 3 cm/s in 2.5 ms are 12 m/s².
 const FELT: f32 = 6.0;
-/// Its square fades by this with each sample.
+/// Decay of the squared change per sample.
 const BLOW_FADES: f32 = 0.6;
-/// Readings keep telling that it stands or leaves the floor, one in this time.
+/// Time for which a reading shows that the vehicle stands or leaves the floor.
 const LOW: Duration = Duration::from_millis(100);
-/// How long before the stamp of a reading its pictures were taken, beside its interval.
+/// Delay of a reading's frames before its stamp, in addition to its interval.
 const LATE: Duration = Duration::from_millis(4);
-/// Share of the jump that stays uncertain.
+/// Uncertain share of a jump after its correction.
 const UNCERTAIN: f32 = 0.2;
 
-/// A jump that is being examined.
+/// A jump under examination.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Examination {
     since: Instant,
     jump: [f32; 2],
-    /// A reckoner that goes on meanwhile, and the estimate's velocity less its at the jump, m/s.
+    /// A reckoner that runs throughout, and the estimate's velocity minus its own at the jump, m/s.
     reckoner: usize,
     apart: Vec3,
     sum: [f32; 2],
     readings: u32,
 }
 
-/// A jump that was the gyro's own: about body x and y, rad/s, when it happened, and what to add to the
-/// estimated velocity to be without the camera's part since, world, m/s.
+/// A confirmed jump: about body x and y, rad/s; its time; and the correction of the estimated
+/// velocity for the camera's effect since then, world, m/s.
 struct Found {
     jump: [f32; 2],
     since: Instant,
     velocity: Vec3,
 }
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroJumped {
-    /// About body x and y, newest first, rad/s, and how many there are.
+    /// About body x and y, newest first, rad/s, and number of samples so far.
     rates: [[f32; 2]; 4],
     samples: u32,
     accel: Vec3,
-    /// Largest square of a change of the specific force between samples, over the last four or so.
+    /// Largest squared change of the specific force between samples, over about the last four.
     blow: f32,
-    /// Mean of what the picture lacks of the gyro's rate, rad/s.
+    /// Mean of the gyro rate that the image lacks, rad/s.
     before: [f32; 2],
-    /// When it last stood, or was leaving the floor.
+    /// Time at which the vehicle last stood or was leaving the floor.
     low: Option<Instant>,
     examination: Option<Examination>,
 }
@@ -94,7 +95,7 @@ impl Hypothesis for GyroJumped {
         let found = self.flow(config, seen);
         let found = seen.samples.iter().fold(found, |found, sample| self.sample(config, seen, sample).or(found));
         let Some(Found { jump, since, velocity }) = found else { return Opinion::Unknown };
-        // It is not found again.
+        // Remove the jump from the stored rates, so that it is not found again.
         let [a, b, ..] = self.rates;
         self.rates = [a, b, b, b];
         self.before = [self.before[0] + jump[0], self.before[1] + jump[1]];
@@ -113,7 +114,7 @@ impl Hypothesis for GyroJumped {
 }
 
 impl GyroJumped {
-    /// Takes a sample. Gives a jump and when it happened, where the picture need not be asked.
+    /// Takes a sample. Returns a jump that can be confirmed without the image.
     fn sample(&mut self, config: &MonitorConfig, seen: &Evidence<'_>, sample: &Stamped<ImuData>) -> Option<Found> {
         let Stamped { at, data, .. } = sample;
         self.rates = [[data.gyro.x, data.gyro.y], self.rates[0], self.rates[1], self.rates[2]];
@@ -128,7 +129,7 @@ impl GyroJumped {
             return None;
         }
         let [a, b, c, d] = self.rates;
-        // Of the last two to the two before.
+        // Difference of the last two samples' mean and that of the two before.
         let jump = [0.5 * (a[0] + b[0] - c[0] - d[0]), 0.5 * (a[1] + b[1] - c[1] - d[1])];
         let size = squared(jump);
         let noise = config.gyro_jump_rms * config.gyro_jump_rms * seen.shaken[1];
@@ -145,14 +146,14 @@ impl GyroJumped {
         if is_low && self.blow < FELT * FELT * size {
             return Some(Found { jump, since, velocity: Vec3::zeros() });
         }
-        // The younger one does not begin anew before it is over.
+        // The younger reckoner does not restart before the examination ends.
         let reckoner = 1 - seen.reckoners.older().min(1);
         let apart = seen.reckoners.apart(reckoner);
         self.examination = Some(Examination { since, jump, reckoner, apart, sum: [0.0; 2], readings: 0 });
         None
     }
 
-    /// Takes a reading of the camera. Gives a jump that it does not share, and when it happened.
+    /// Takes a camera reading. Returns a jump that the image does not show.
     fn flow(&mut self, config: &MonitorConfig, seen: &Evidence<'_>) -> Option<Found> {
         let flow = seen.flow.as_ref()?;
         let leaves = self.low.is_some_and(|low| seen.now.since(low) < LOW);
@@ -171,7 +172,7 @@ impl GyroJumped {
             }
             return None;
         };
-        // What the camera has done to the velocity since is no motion.
+        // Velocity that the camera has added since the jump is not motion.
         let grown = seen.reckoners.apart(examination.reckoner) - examination.apart;
         let body = seen.estimate.attitude.inverse_transform_vector(&grown.horizontal());
         let excess = [flow.rate[1] + body.y / flow.distance, -flow.rate[0] - body.x / flow.distance];

@@ -1,10 +1,11 @@
-//! The gyro's zero has shifted in the air, or a burst of it has turned the attitude, which shows as a
-//! course of the camera's velocity.
+//! The gyro's zero has shifted in flight, or a burst has rotated the attitude, seen in the course
+//! of the camera velocity.
 //!
-//! The residual of the camera exceeds its gate and has the course that a shift makes, and no fault of the
-//! camera makes it as well ([`course`](crate::course)). The camera is the sensor that is right then.
+//! The camera residual exceeds its gate with the course that a shift produces, and no camera fault
+//! explains it as well ([`course`](crate::course)). The camera is then the correct sensor.
 //!
-//! Not for a jump that shows in a single sample: [`gyro_jumped`](super::gyro_jumped) takes 50 ms.
+//! Not for a jump that is visible in a single sample: [`gyro_jumped`](super::gyro_jumped) needs
+//! only 50 ms.
 
 use crate::config::MonitorConfig;
 use crate::course::Explanation;
@@ -13,24 +14,24 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::{EstimateCorrection, Finding};
 use stampfly_types::{Duration, Instant, Vec3, math};
 
-/// Two shifts are so far apart at least: two lives of a reckoner.
+/// Smallest time between two shifts: two lifetimes of a reckoner.
 const LATELY: Duration = Duration::from_secs(6);
-/// Share of a shift that the fit leaves uncertain.
+/// Uncertain share of a shift after the fit.
 const UNCERTAIN: f32 = 0.1;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroShifted {
-    /// How long the residual has exceeded the gate, s.
+    /// Time for which the residual has exceeded the gate, s.
     exceeds: f32,
-    /// When the last shift was found.
+    /// Time of the last shift.
     last: Option<Instant>,
 }
 
 impl GyroShifted {
-    /// Was a shift found so lately that another one is something else? A zero moves once; a floor that
-    /// moves to and fro makes one course after the other.
+    /// Whether a shift was found so recently that another one has a different cause: a zero shifts
+    /// once, while a floor that moves back and forth produces one course after the other.
     pub(crate) fn was_lately(&self, now: Instant) -> bool {
         self.last.is_some_and(|last| now.since(last) < LATELY)
     }
@@ -62,10 +63,10 @@ impl Hypothesis for GyroShifted {
         self.last = Some(seen.now);
         let reckoner = seen.reckoners.get(older);
         let [north, east] = shift.rate;
-        // Since the last point the shift has turned it on.
+        // Continue the rotation from the last point to the present.
         let since = reckoner.age - shift.at;
         let turn = Vec3::new(shift.turn[0] - north * since, shift.turn[1] - east * since, 0.0);
-        // The camera is right, but for the rotation that it was compensated for.
+        // The camera is correct except for its rotation compensation.
         let [x, y] = flow.smooth.get(older).copied().unwrap_or_default();
         let velocity = Vec3::new(x + flow.distance * east, y - flow.distance * north, 0.0);
         let rate = reckoner.attitude.inverse_transform_vector(&Vec3::new(north, east, 0.0));

@@ -1,12 +1,12 @@
-//! The gyro's zero has shifted on a vehicle that stands.
+//! The gyro's zero has shifted while the vehicle stands.
 //!
-//! A body that turns takes gravity with it, through its axes. Over quarters of a second the turn that
-//! the gyro tells is compared with the one that gravity shows. A gyro that turns while gravity stays
-//! has shifted. The estimate's attitude does not show it: gravity brings it back, and an
-//! accelerometer's bias looks the same.
+//! A body that turns moves gravity through its axes. Over quarters of a second the rotation
+//! measured by the gyro is compared with that of gravity. If the gyro turns and gravity does not,
+//! the zero has shifted. The estimate's attitude is not usable for this test: gravity pulls it
+//! back, and an accelerometer bias looks the same.
 //!
-//! Gravity does not show a turn about the vertical, so the z axis is left out. A vehicle that is
-//! carried turns both, and is not judged.
+//! Gravity does not show rotation about the vertical, so the z axis is excluded. A vehicle that is
+//! carried moves both and is not tested.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
@@ -14,16 +14,16 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::{EstimateCorrection, Finding, ImuData};
 use stampfly_types::{GRAVITY, Instant, Stamped, Vec3};
 
-/// Each comparison is of the means over so long, s.
+/// Length of the compared means, s.
 const WINDOW: f32 = 0.25;
-/// Share of the shift that gravity may turn by: a vehicle that is moved by hand is not judged. The
-/// same share may the shift differ by from one comparison to the next.
+/// Largest rotation of gravity as a share of the shift; more means that the vehicle is moved by
+/// hand. Also the largest difference between two successive comparisons.
 const STILL: f32 = 0.3;
-/// Share of the shift that stays uncertain.
+/// Uncertain share of the shift after its correction.
 const UNCERTAIN: f32 = 0.1;
-/// Standard deviation of the tilt by gravity alone, rad: an accelerometer's zero of 0.3 m/s².
+/// Standard deviation of the tilt by gravity alone, rad: an accelerometer bias of 0.3 m/s².
 const TILT_SIGMA: f32 = 0.03;
-/// A gap counts as this long at most, s.
+/// Upper bound on the interval between samples, s.
 const LONGEST_STEP: f32 = 0.05;
 
 /// Means over a window.
@@ -36,20 +36,20 @@ struct Means {
     rate: Vec3,
 }
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroStanding {
     last: Option<Instant>,
-    /// The window before, and the one that is being filled.
+    /// The last window and the one being filled.
     before: Option<Means>,
     now: Means,
-    /// What the last comparison found, rad/s.
+    /// Result of the last comparison, rad/s.
     found: Option<[f32; 2]>,
 }
 
 impl GyroStanding {
-    /// Takes a sample; gives a shift about body x and y, rad/s, that two comparisons agree on.
+    /// Takes a sample. Returns a shift about body x and y, rad/s, on which two comparisons agree.
     fn sample(&mut self, sample: &Stamped<ImuData>, bias: &Vec3, smallest: f32) -> Option<[f32; 2]> {
         let Stamped { at, data, .. } = sample;
         let last = self.last.replace(*at).unwrap_or(*at);
@@ -87,14 +87,14 @@ impl Hypothesis for GyroStanding {
             };
             let force = self.before.map_or(Vec3::zeros(), |before| before.accel);
             *self = Self::default();
-            // Gravity is the vertical, as at power-on.
+            // Level the attitude by gravity, as at power-on.
             let up = seen.estimate.attitude.inverse_transform_vector(&Vec3::new(0.0, 0.0, -1.0));
             let turn = force.cross(&up) / force.norm().max(1.0);
             let shift = Vec3::new(x, y, 0.0);
             return Opinion::Holds(Some(EstimateCorrection {
                 turn: seen.estimate.attitude.transform_vector(&Vec3::new(turn.x, turn.y, 0.0)),
                 gyro_bias: shift,
-                // What the shift did to the attitude went into the accelerometer's bias as well.
+                // The shift's effect on the attitude has also entered the accelerometer bias.
                 accel_bias: -seen.estimate.accel_bias.horizontal(),
                 tilt_sigma: TILT_SIGMA,
                 gyro_bias_sigma: UNCERTAIN * shift.norm(),
@@ -105,9 +105,9 @@ impl Hypothesis for GyroStanding {
     }
 }
 
-/// By how much the gyro turns more than gravity, about body x and y, if it alone does, rad/s.
+/// Rotation of the gyro minus that of gravity about body x and y, rad/s, if only the gyro turns.
 fn excess(before: &Means, now: &Means, smallest: f32) -> Option<[f32; 2]> {
-    // A rate w about x and y moves gravity, which points along -z, by g times (w.y, -w.x) each second.
+    // A rate w about x and y moves gravity, which points along −z, by g·(w.y, −w.x) per second.
     let per_second = (now.accel - before.accel) / (GRAVITY * 0.5 * (before.elapsed + now.elapsed));
     let gravity = [-per_second.y, per_second.x];
     let rate = (before.rate + now.rate) * 0.5;

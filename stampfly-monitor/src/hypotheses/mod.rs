@@ -1,4 +1,4 @@
-//! The hypotheses, one a file.
+//! The hypotheses, one per file.
 
 mod flow_disagrees;
 mod flow_frozen;

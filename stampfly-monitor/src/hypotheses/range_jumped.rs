@@ -1,11 +1,11 @@
-//! The range jumps and stays there, and the vehicle does not move sideways.
+//! The range jumps and stays there while the vehicle does not move sideways.
 //!
-//! A table makes a range jump, too, but only below a vehicle that crosses its edge. And a phase that
-//! wraps reads less than half of the distance; over a table as high as that the barometer holds the
-//! height, and behind it the range is used again.
+//! A table also makes a range jump, but only under a vehicle that crosses its edge. A wrapped phase
+//! reads less than half of the distance; over a table of that height the barometer holds the
+//! height, and the range is used again behind it.
 //!
-//! Here the range is cleared, too: a second of readings that change, do not jump and lie where the
-//! estimate expects them.
+//! This hypothesis also clears the range: after a second of readings that change, do not jump and
+//! agree with the estimate.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
@@ -13,22 +13,22 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::{Finding, SensorMask};
 
-/// At this speed a vehicle may cross an edge or a table meanwhile, m/s.
+/// Speed at which a vehicle may cross an edge, m/s.
 const CROSSES: f32 = 0.15;
-/// Nor does it see something rise to less than this share of the distance.
+/// Share of the expected distance below which a sudden reading is no real surface.
 const NEARER: f32 = 0.5;
-/// Readings running that the estimator rejects: 0.13 s, before it moves its height to them.
+/// Number of consecutive rejections: 0.13 s, before the estimator resets its height to them.
 const REJECTED: u32 = 4;
-/// How near a range has to be to what is expected, m, to be used again.
+/// Largest difference from the expected range for agreement, m.
 const AGREES: f32 = 0.15;
-/// A reading that repeats itself so often agrees with nothing.
+/// Number of repetitions from which a reading does not count as agreement.
 const REPEATED: u32 = 15;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeJumped {
-    /// Readings running that were rejected, and whether the first of them jumped or leaped.
+    /// Number of consecutive rejections, and whether the first of them jumped or leaped.
     rejected: u32,
     jumped: bool,
     leaped: bool,
@@ -58,7 +58,7 @@ impl Hypothesis for RangeJumped {
         let speed = math::sqrt(velocity.x * velocity.x + velocity.y * velocity.y);
         let stays = seen.estimate.sensors.contains(SensorMask::FLOW) && speed < CROSSES;
         let nearer = range.distance < NEARER * range.expected && (self.jumped || self.leaped);
-        // An estimator that started in the air has to find its height first.
+        // An estimator that started in the air must find its height first.
         let wrong = seen.altimeter.has_begun() && (nearer || self.jumped && stays);
         if wrong && self.rejected >= REJECTED { Opinion::Holds(None) } else { Opinion::Unknown }
     }

@@ -1,4 +1,4 @@
-//! Many ranges jump, each for itself: outliers, or the edge of something below.
+//! Many ranges jump independently: outliers, or the edge of an object below.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
@@ -6,14 +6,14 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// Jumps, less one for every so many seconds.
+/// Limit of the jump counter, which decreases by one per `FADES` seconds.
 const JUMPS: f32 = 5.0;
 const FADES: f32 = 0.4;
-/// More than so many times the estimate's height was moved to a range, until none was rejected for
-/// three seconds.
+/// Largest number of resets of the estimate's height to the range within a series of rejections;
+/// the series ends after three seconds without one.
 const MOVES: u32 = 3;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeOutliers {

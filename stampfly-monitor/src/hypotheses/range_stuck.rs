@@ -1,36 +1,36 @@
-//! The range repeats itself while the vehicle moves.
+//! The range repeats one value while the vehicle moves.
 //!
-//! Noise of a millimetre repeats a reading with a probability below 0.4. Dirt on the glass, a frozen
-//! register and a cover do it for ever.
+//! A noise of one millimetre repeats a reading with a probability below 0.4. Dirt on the glass, a
+//! frozen register or a cover repeat it permanently.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// How far the altimeter moves while the range repeats itself, m.
+/// Motion of the altimeter during the repetitions, m.
 const MOVED: f32 = 0.2;
-/// Readings running that are equal while it moves so far: a range that measures changes with it. More
-/// of them until the altimeter has settled, which may drift while the vehicle still stands.
+/// Number of repetitions while it moves that far. The larger one holds until the altimeter has
+/// settled, because it may drift while the vehicle still stands.
 const WHILE_MOVING: u32 = 6;
 const UNSETTLED: u32 = 15;
-/// As many after a jump.
+/// Number of repetitions after a jump.
 const AFTER_JUMP: u32 = 8;
-/// As many whether anything moves or not: 1.5 s.
+/// Number of repetitions without any motion: 1.5 s.
 const ALWAYS: u32 = 45;
-/// As many from the ground on, those on the ground and those in the air together: 3 s. Recorded
-/// StampFlys repeat one 24 times there.
+/// Number of repetitions since the ground, on it and in flight together: 3 s. Recorded StampFlys
+/// repeat a range 24 times on the ground.
 const FROM_GROUND: u32 = 90;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeStuck {
-    /// Height of the altimeter when the range began to repeat itself, m.
+    /// Height of the altimeter at the first repetition, m.
     from: f32,
     /// The first of the equal readings had jumped.
     jumped: bool,
-    /// Equal readings on the ground, before the take-off; none as soon as the range changes.
+    /// Repetitions on the ground before the take-off; cleared when the range changes.
     stood: u32,
 }
 
@@ -41,7 +41,7 @@ impl Hypothesis for RangeStuck {
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
         let altimeter = seen.altimeter;
         if !seen.flies && !seen.stands {
-            // Propellers that stop take an error of the accelerometer with them.
+            // The accelerometer's error changes when the propellers stop: restart the comparison.
             self.from = altimeter.height;
         }
         let Some(repeat) = &seen.range_repeat else { return Opinion::Unknown };

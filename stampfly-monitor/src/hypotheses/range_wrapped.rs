@@ -1,65 +1,64 @@
-//! The vehicle is higher than the estimate, by the barometer and since it stood.
+//! The vehicle has risen above the estimate since it stood, by the barometer.
 //!
-//! A range that wraps below the height of a leg says for the whole of a take-off that the vehicle has
-//! hardly left the floor, and the controller pushes until it flies seven metres higher.
-//! The barometer shows it late, because propellers
-//! that start change the pressure, and the more the nearer the floor is: by up to 0.6 m, in either
-//! direction. So does a door, by 1.5 m within a second. What tells a climb from a door is that it is
-//! felt: of the climb rate that the estimate does not have, the accelerometer has gained a share.
-//! Vibration takes the rest, and more than all of it from a vehicle that shakes hard. What neither
-//! propellers nor doors make is believed without it.
+//! A range that wraps below the height of a leg reports during the whole take-off that the vehicle
+//! has hardly left the floor, and the controller raises the thrust until it flies seven metres
+//! higher. The barometer shows that late, because starting propellers change the pressure by up to
+//! 0.6 m in either direction, most near the floor, and a door by 1.5 m within a second. A climb
+//! differs from a door in that the accelerometer measures it: it has gained a share of the climb
+//! rate that the estimate lacks. Vibration hides the rest, and all of it on a vehicle that vibrates
+//! strongly. A rise beyond the effect of propellers and doors is reported without that condition.
 //!
-//! For ten seconds after the take-off, because weather changes the pressure as well. Not for a vehicle
-//! that is lower than the estimate.
+//! Active for ten seconds after the take-off, because the weather changes the pressure, too. Not
+//! for a vehicle that is lower than the estimate.
 
 use crate::config::MonitorConfig;
 use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// For so long after the vehicle stood, s.
+/// Time after the take-off for which it is active, s.
 const LASTS: f32 = 10.0;
-/// How much higher, m: what propellers do to the pressure, and half a metre for gusts and noise;
-/// and what a door does besides.
+/// Smallest rise above the estimate, m: the effect of propellers on the pressure plus half a metre
+/// for gusts and noise; and the addition for a door.
 const ABOVE: f32 = 0.6 + 0.5;
 const DOOR: f32 = 1.5;
-/// A climb is felt when the accelerometer has gained this share of it, over this time, s. Recorded
-/// StampFlys lose 1.1 m/s² to vibration; a take-off that is given a fifth more thrust than its
-/// weight has 2.
+/// A climb counts as measured if the accelerometer has gained the share `FELT` of it over `GAINS`
+/// seconds. Recorded StampFlys lose 1.1 m/s² to vibration; a take-off with a thrust one fifth above
+/// the weight has 2.
 const FELT: f32 = 1.0 / 3.0;
 const GAINS: f32 = 2.0;
-/// A slower climb than this, m/s, is not told from what readings of the barometer are noisy by.
+/// Smallest climb rate that is distinguished from barometer noise, m/s.
 const CLIMBS: f32 = 0.5;
-/// Time constant with which the place where the vehicle stands is followed, s. Propellers that start
-/// do it before the vehicle rises, and what they do then has to count.
+/// Time constant of the altitude of the place where the vehicle stands, s. Slow, because the
+/// pressure change of propellers that start before the take-off must count.
 const STANDS: f32 = 2.0;
-/// Time constant of the tracker, s: a reading is noisy by 0.1 m, and what climbs with full thrust
-/// gains 1 m/s in it.
+/// Time constant of the tracker, s. A reading has 0.1 m of noise; a climb with full thrust gains 1
+/// m/s in this time.
 const TRACKS: f32 = 0.2;
-/// Time between two readings counts as this long at least, s.
+/// Lower bound on the interval between readings, s.
 const SHORTEST: f32 = 0.005;
-/// No climb makes so much between two readings, m: the pressure has stepped, and says nothing until
-/// the vehicle stands again.
+/// Largest change of altitude between two readings of a climb, m. A larger one is a step of the
+/// pressure, after which the barometer is not used until the vehicle stands again.
 const STEP: f32 = 0.35;
 
-/// See the head of this file.
+/// See the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeWrapped {
-    /// How long ago the vehicle stood, s; `None` for one that has not stood.
+    /// Time since the vehicle stood, s; `None` if it has not stood.
     time: Option<f32>,
-    /// How far the altitude has risen above where the vehicle stood, m.
+    /// Rise of the altitude above the place where the vehicle stood, m.
     risen: f32,
-    /// The same tracked, m, and how fast it rises, m/s.
+    /// The same after the tracker, m, and its rate, m/s.
     tracked: f32,
     climb: f32,
-    /// By how much more than the estimated height, m.
+    /// Excess over the estimated height, m.
     above: f32,
-    /// Bias of the upward acceleration where the vehicle stood, m/s², and the speed upwards that
-    /// was felt lately with it, m/s.
+    /// Bias of the upward acceleration on the ground, m/s², and recent gain of upward velocity with
+    /// it, m/s.
     bias: f32,
     gained: f32,
-    /// The estimated climb rate, m/s.
+    /// Estimated climb rate, m/s.
     believed: f32,
 }
 
@@ -82,7 +81,7 @@ impl Hypothesis for RangeWrapped {
         } else if seen.trusts_range {
             self.baro(altitude.change, seen.estimate.height - config.ground_clearance_m, altitude.dt);
         } else {
-            // Found, or without a range to compare: until it stands again.
+            // Already found, or no range to compare with: wait until the vehicle stands again.
             *self = Self { bias: self.bias, ..Self::default() };
         }
         match self.is_above().filter(|_| seen.trusts_range && !seen.stands) {
@@ -93,14 +92,14 @@ impl Hypothesis for RangeWrapped {
 }
 
 impl RangeWrapped {
-    /// The upward velocity has changed by this much within `dt` seconds, no bias removed; the
-    /// estimated climb rate.
+    /// Takes the change of the upward velocity within `dt` seconds, bias included, and the
+    /// estimated climb rate, m/s.
     fn felt(&mut self, change: f32, climb: f32, dt: f32) {
         self.gained += change - (self.bias + self.gained * (1.0 / GAINS)) * dt;
         self.believed = climb;
     }
 
-    /// The altitude of a vehicle that stands has changed by this much within `dt` seconds.
+    /// Takes the change of the altitude of a standing vehicle, m, within `dt` seconds.
     fn stand(&mut self, change: f32, dt: f32) {
         if change > STEP {
             *self = Self { bias: self.bias, ..Self::default() };
@@ -110,8 +109,8 @@ impl RangeWrapped {
         *self = Self { time: Some(0.0), risen, tracked: risen, bias: self.bias, ..Self::default() };
     }
 
-    /// The altitude has changed by this much within `dt` seconds; the estimate is so high above where
-    /// the vehicle stood.
+    /// Takes the change of the altitude in flight, m, within `dt` seconds, and the estimated height
+    /// above the place where the vehicle stood, m.
     fn baro(&mut self, change: f32, height: f32, dt: f32) {
         let Some(time) = &mut self.time else { return };
         *time += dt;
@@ -120,7 +119,7 @@ impl RangeWrapped {
             return;
         }
         self.risen += change;
-        // Both poles at one place, so that what climbs faster and faster is not followed too late.
+        // Two equal poles, so that an accelerating climb is followed without much lag.
         let pole = TRACKS / (TRACKS + dt);
         self.tracked += self.climb * dt;
         let off = self.risen - self.tracked;
@@ -129,8 +128,7 @@ impl RangeWrapped {
         self.above = self.tracked - height;
     }
 
-    /// If the vehicle is too much higher than the estimate: by how much at least, m, and how fast it
-    /// climbs, m/s.
+    /// If the vehicle is too far above the estimate: the difference, m, and the climb rate, m/s.
     fn is_above(&self) -> Option<(f32, f32)> {
         let unknown = self.climb - self.believed;
         let felt = unknown > CLIMBS && self.gained - self.believed > FELT * unknown;
@@ -146,8 +144,8 @@ mod tests {
 
     const DT: f32 = 0.04;
 
-    /// Altitude and height as functions of the time since the take-off, s, and the acceleration
-    /// that is felt, m/s². When is the vehicle found to be too high?
+    /// Time at which the finding is made; altitude, height, m, and measured acceleration, m/s², are
+    /// functions of the time since the take-off, s.
     fn found_feeling(
         altitude: impl Fn(f32) -> f32,
         height: impl Fn(f32) -> f32,
@@ -163,19 +161,19 @@ mod tests {
         })
     }
 
-    /// The same of one that feels what vibration leaves of a hover.
+    /// The same with the acceleration that vibration leaves of a hover.
     fn found(altitude: impl Fn(f32) -> f32, height: impl Fn(f32) -> f32) -> Option<f32> {
         found_feeling(altitude, height, |_| -1.1)
     }
 
-    /// Propellers that start, and the floor below them.
+    /// Effect of starting propellers and of the floor on the altitude, m.
     fn wash(height: f32) -> f32 {
         -0.2 - 0.4 * (1.0 - height / 0.5).clamp(0.0, 1.0)
     }
 
     #[test]
     fn a_vehicle_that_climbs_while_the_filter_believes_it_stands_is_found() {
-        // Two metres a second faster every second, of which vibration takes half.
+        // A climb with 2 m/s², of which vibration hides half.
         let climbs = |now: f32| now * now;
         let altitude = |now: f32| climbs(now) + wash(climbs(now));
         let when = found_feeling(altitude, |_| 0.02, |_| 0.9).expect("found");

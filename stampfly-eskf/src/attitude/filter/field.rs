@@ -1,7 +1,7 @@
-//! What a magnetic field does to the attitude filter.
+//! Magnetic field updates of the attitude filter.
 //!
-//! First it is freed of the sensor's own magnetised parts, then compared with the reference, and then it may correct
-//! the heading, as far as its status allows. Nothing here touches the tilt.
+//! A field is freed of hard iron, compared with the reference, and then corrects the heading as far
+//! as its status allows. Nothing here changes the tilt.
 
 use super::super::magnetic::{FieldStatus, Magnetic};
 use super::super::rotation::{from_vector, product, within};
@@ -11,22 +11,22 @@ use crate::estimator::{Fusion, Refusal};
 use nalgebra::Matrix3;
 use stampfly_types::Vec3;
 
-/// A magnetometer sample may be this late, s.
+/// Largest age of a magnetometer sample, s.
 const OLDEST: f32 = 0.1;
-/// Bend of a field that there is no reference for, rad.
+/// Direction error assumed for a field without a reference, rad.
 const NO_REFERENCE_SIGMA: f32 = 0.2;
-/// A new estimate of the hard iron is taken into use when it differs by this share of the field.
+/// Change of the hard iron, as a share of the field, at which the new estimate is adopted at once.
 const NEW_OFFSET: f32 = 0.05;
-/// Smaller changes are followed within this time, s, and the reference field with them.
+/// Time constant with which smaller changes are followed, s; the reference field follows, too.
 const OFFSET_TIME: f32 = 10.0;
 
 impl AttitudeFilter {
-    /// Takes a magnetic field, body FRD, µT, that was measured `age` seconds before the last step and `dt` seconds
-    /// after the field before it.
+    /// Takes a magnetic field, body FRD, µT, measured `age` seconds before the last step and `dt`
+    /// seconds after the field before it.
     ///
-    /// Disturbed fields are [`Fusion::Gated`]; a field that has become the new reference is a [`Fusion::Reset`]. Fields
-    /// later than a tenth of a second, not finite, or before the first step, are refused, and so is one without a
-    /// level part.
+    /// Returns [`Fusion::Gated`] for a disturbed field and [`Fusion::Reset`] for one that became a
+    /// new reference. Refuses fields older than 0.1 s, not finite, before the first step, or
+    /// without a horizontal part.
     pub fn field(&mut self, field: &Vec3, age: f32, dt: f32) -> Fusion {
         if !self.started {
             return Fusion::Refused(Refusal::NotInitialized);
@@ -42,7 +42,7 @@ impl AttitudeFilter {
         }
         let dt = dt.min(LONGEST_STEP);
         self.ask_witness(field, dt);
-        // Where the body was when the field was what this sample says.
+        // Attitude at the time of the measurement: go back by the delays at the current rate.
         let late = age + self.mag_delay() - self.config.inertial_delay;
         let then = product(&self.strapdown, &from_vector(&(self.rate * -late)));
         let turn = Matrix3::from(self.level * then);
@@ -67,7 +67,7 @@ impl AttitudeFilter {
                 Fusion::Gated { ratio }
             }
             FieldStatus::NoReference => {
-                // The only heading there is; with a large variance while the tilt settles.
+                // The only source of heading. Its variance is large while the tilt settles.
                 if !self.force.is_settled() {
                     self.heading.inflate(MOVING_START_SIGMA);
                 }
@@ -93,7 +93,7 @@ impl AttitudeFilter {
         }
     }
 
-    /// Ends a rest that the field contradicts, and makes up for it.
+    /// Ends a rest that the field contradicts, and reverts its effects.
     fn ask_witness(&mut self, field: &Vec3, dt: f32) {
         let field = field - self.offset;
         let rate = self.stationary.rate();
@@ -103,7 +103,7 @@ impl AttitudeFilter {
         }
     }
 
-    /// Takes back what a rest that was none did to bias and attitude.
+    /// Reverts the effect of a false rest on bias, attitude and heading.
     pub(super) fn undo_rest(&mut self, Contradiction { undo }: Contradiction) {
         if let Some(Undo { bias, turned, sigma }) = undo {
             self.bias.restore(&bias);
@@ -112,9 +112,9 @@ impl AttitudeFilter {
         }
     }
 
-    /// Estimates hard iron, and takes a new estimate into use when it differs enough to matter.
+    /// Estimates hard iron, and adopts the estimate at once if it changed significantly.
     fn remove_hard_iron(&mut self, level: &Matrix3<f32>, field: &Vec3, dt: f32) {
-        // A tilt that is still settling would pass for hard iron.
+        // While the tilt settles, its error looks like hard iron.
         if !self.config.hard_iron || !self.force.is_settled() {
             return;
         }

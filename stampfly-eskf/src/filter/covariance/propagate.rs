@@ -1,14 +1,15 @@
-//! Propagation of the covariance over a few inertial samples at once.
+//! Propagation of the covariance over several inertial samples at once.
 //!
-//! It uses the block structure of F: of the five block rows three change, and of those the last two block columns change only by
-//! the row operation; the other triangle is a mirror of the first. Terms of second order in the duration are left out of the position.
+//! It uses the block structure of F. Of the five block rows three change, and in those the last two
+//! block columns change only by the row operation. One triangle is computed and mirrored. Terms of
+//! second order in the duration are neglected in the position.
 
 use super::super::lanes::Lanes;
 use super::super::propagation::PropagationStep;
 use super::super::state::{Rotation, rotation_matrix};
 use super::{BLOCKS, Covariance, add_rows};
 
-/// White noise driving the error state, as variances a second.
+/// White noise that drives the error state, as variance per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ProcessNoise {
@@ -22,7 +23,7 @@ pub struct ProcessNoise {
     pub accel_bias: f32,
 }
 
-/// Smallest variance a state may claim, so that rounding never makes one zero or negative.
+/// Smallest variance of a state, so that rounding never makes one zero or negative.
 const FLOOR: [f32; BLOCKS] = [
     1e-8,  // position, (0.1 mm)²
     1e-8,  // velocity, (0.1 mm/s)²
@@ -31,7 +32,7 @@ const FLOOR: [f32; BLOCKS] = [
     1e-9,  // accelerometer bias, (0.03 mm/s²)²
 ];
 
-/// Columns of the blocks of F that are neither zero nor a multiple of one.
+/// Columns of the blocks of F that are neither zero nor a multiple of the identity.
 struct Columns {
     /// Of velocity ← attitude.
     by_attitude: [Lanes; 3],
@@ -42,7 +43,7 @@ struct Columns {
     dt: f32,
 }
 
-// One row of a block: short where it is a few vector instructions, and there once where it is not.
+// One row of a block. Inlined where it is a few vector instructions, one shared copy elsewhere.
 impl Columns {
     #[cfg_attr(any(target_arch = "x86_64", target_arch = "aarch64"), inline(always))]
     #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), inline(never))]
@@ -63,9 +64,9 @@ impl Columns {
 impl Covariance {
     /// P ← F·P·Fᵀ + Q over a short step that begins in the attitude `rotation`.
     ///
-    /// F = I, plus τ in position ← velocity, −\[s\]×·R in velocity ← attitude, −R·τ in velocity ← accelerometer bias,
-    /// ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s and ΔR of the [`PropagationStep`]. Terms
-    /// of second order in τ are left out of the position.
+    /// F = I, plus τ in position ← velocity, −\[s\]×·R in velocity ← attitude, −R·τ in velocity ←
+    /// accelerometer bias, ΔRᵀ in attitude ← attitude and −I·τ in attitude ← gyro bias, with τ, s
+    /// and ΔR of the [`PropagationStep`]. Terms of second order in τ are neglected in the position.
     #[inline]
     pub fn propagate(&mut self, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) {
         let PropagationStep { duration: dt, delta_velocity, .. } = *step;
@@ -83,8 +84,8 @@ impl Covariance {
         let turn_back = rotation_matrix(step.delta_rotation);
         let turn = columns(&turn_back);
 
-        // Rows: T = F·P for the nine that change, from the diagonal block on. Each block needs only those after it as they
-        // were, so it takes their place.
+        // Rows: T = F·P for the nine rows that change, from the diagonal block on. Each block needs
+        // the unchanged blocks after it only, so the result overwrites it.
         let [position, velocity, attitude, gyro_bias, accel_bias] = &mut self.rows;
         for (row, velocity) in position.iter_mut().zip(&*velocity) {
             add_rows::<0, 1>(row, [dt], [velocity]);
@@ -100,7 +101,8 @@ impl Covariance {
             add_rows::<2, 4>(row, [c[0], c[1], c[2], -dt], [&x, &y, &z, gyro_bias]);
         }
 
-        // Columns: the first three blocks of T·Fᵀ, from the diagonal block on; the bias columns of T are already final.
+        // Columns: the first three block columns of T·Fᵀ, from the diagonal block on. The bias
+        // columns of T are final.
         let as_lanes = |[x, y, z]: Rotation| [Lanes::new(x), Lanes::new(y), Lanes::new(z)];
         let columns = Columns {
             by_attitude: as_lanes(columns(&by_attitude)),
@@ -132,7 +134,7 @@ impl Covariance {
     }
 }
 
-/// The columns of a matrix in row order.
+/// The columns of a matrix given in row order.
 #[inline(always)]
 fn columns([x, y, z]: &Rotation) -> Rotation {
     [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]]

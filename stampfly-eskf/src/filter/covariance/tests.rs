@@ -1,4 +1,4 @@
-//! Against the text book's form, dense and in double precision.
+//! Covariance arithmetic compared with the textbook form, dense and in double precision.
 
 use super::*;
 use crate::filter::PropagationStep;
@@ -13,7 +13,7 @@ fn dense(p: &Covariance) -> Dense {
     Dense::from_fn(|i, j| f64::from(p.get(i, j)))
 }
 
-/// The same step in the text book's form, dense and in double precision.
+/// The same step in the textbook form, dense and in double precision.
 fn reference(p: &Dense, rotation: &Rotation, step: &PropagationStep, noise: &ProcessNoise) -> Dense {
     let dt = f64::from(step.duration);
     let matrix = |m: &Rotation| nalgebra::Matrix3::from_fn(|i, j| f64::from(m[i][j]));
@@ -65,7 +65,7 @@ proptest! {
         rates in prop::collection::vec((-3f32..3.0, -3f32..3.0, -3f32..3.0, -3f32..3.0), 20),
     ) {
         let mut p = Covariance::from_sigmas([0.1, 0.1, 0.1, 0.01, 0.1]);
-        // The other way through the rows, which this machine does not take by itself.
+        // The variant of the update that this machine does not use.
         let mut other = p;
         let mut exact = dense(&p);
         let mut state = NominalState::default();
@@ -158,7 +158,7 @@ fn reset_clears_the_covariances_of_the_state() {
     assert_eq!((p.get(0, 3), p.get(3, 0), p.get(3, 3)), (0.0, 0.0, 4.0));
 }
 
-/// Two states whose covariance is larger than both their variances, beside others that are sound.
+/// Two states whose covariance exceeds both variances, among valid ones.
 fn contradicting(covariance: f32) -> Covariance {
     let mut p = Covariance::from_sigmas([1.0, 1.0, 0.1, 0.01, 0.1]);
     p.change(0, 3, |_| covariance);
@@ -181,13 +181,13 @@ fn covariances_that_cannot_be_are_dropped_and_teach_nothing() {
             assert!((left / before - 1.0).abs() < 1e-4, "{covariance}: {left}, not {before}");
         }
         assert_eq!(p.get(0, 3), 0.0);
-        // The next measurement teaches what it should.
+        // The next measurement has its normal effect.
         let innovation = p.innovation(&[jacobian(&[(0, 1.0)])], [0.5], [0.01]);
         assert!((p.update(&innovation)[0] - 0.5).abs() < 0.01 && p.is_healthy());
     }
 }
 
-/// A kilometre, and then a tenth of a millimetre: the difference is below the last digit.
+/// A kilometre, then a tenth of a millimetre: the difference is below the last digit of an `f32`.
 #[test]
 fn an_update_by_more_digits_than_there_are_leaves_a_variance() {
     for sigma in [1e3, 1e5, 1e9] {

@@ -1,23 +1,23 @@
 //! Innovation, gain and update with a measurement.
 //!
-//! An update of several axes is sequential and scalar, so no matrix is inverted, but it whitens the innovations first and then passes over the
-//! matrix once.
+//! A measurement of several axes is whitened first, so that scalar updates are exact and no matrix
+//! is inverted, and then subtracted in one pass over the covariance.
 
 use super::super::lanes::{Lanes, VECTORS};
 use super::{BLOCKS, Covariance, N, Row, add_rows, place};
 use stampfly_types::math;
 
-/// Share of a variance that rounding may make of what an update leaves of it.
+/// Largest share of a variance that rounding may have removed.
 const ROUNDING: f32 = 1e-5;
-/// Variance of a state of which nothing is known any more, in its squared unit: a metre, a metre a second, a radian and so on.
+/// Variance of a state about which everything is lost, in its squared unit (m, m/s, rad, …).
 const LOST: f32 = 1.0;
 
-/// The innovation of a measurement of `M` axes, whitened, and the gain that goes with it.
+/// The whitened innovation of a measurement of `M` axes and its gain.
 ///
-/// The axes are made independent by a Cholesky factorisation of their innovation covariance S = L·Lᵀ: the innovations
-/// become L⁻¹·y, each of variance one, and P·Hᵀ becomes P·Hᵀ·L⁻ᵀ. This is the sequential update (Bierman,
-/// "Factorization Methods for Discrete Sequential Estimation", 1977, section V.3) without touching P before the
-/// measurement has passed its gate.
+/// The Cholesky factorisation of the innovation covariance, S = L·Lᵀ, makes the axes independent:
+/// the innovations become L⁻¹·y with unit variance, and P·Hᵀ becomes P·Hᵀ·L⁻ᵀ. This is the
+/// sequential update (Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977,
+/// section V.3) without changing P before the measurement has passed its gate.
 #[derive(Clone, Copy, Debug)]
 pub struct Innovation<const M: usize> {
     /// Square-root gain, the columns of P·Hᵀ·L⁻ᵀ.
@@ -27,14 +27,14 @@ pub struct Innovation<const M: usize> {
 }
 
 impl<const M: usize> Innovation<M> {
-    /// The whitened innovations: independent of each other and each of variance one when the filter is consistent.
+    /// The whitened innovations: independent and of unit variance if the filter is consistent.
     #[inline]
     #[must_use]
     pub fn whitened(&self) -> &[f32; M] {
         &self.whitened
     }
 
-    /// How far the measurement moves each state.
+    /// Correction of each state by the measurement.
     pub(crate) fn correction(&self) -> [f32; N] {
         core::array::from_fn(|state| {
             let (block, axis) = place(state);
@@ -43,8 +43,8 @@ impl<const M: usize> Innovation<M> {
         })
     }
 
-    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement: χ²-distributed with
-    /// `M` degrees of freedom when the filter is consistent.
+    /// Normalised innovation squared yᵀ·S⁻¹·y, the squared Mahalanobis distance of the measurement:
+    /// χ²-distributed with `M` degrees of freedom if the filter is consistent.
     #[inline]
     #[must_use]
     pub fn nis(&self) -> f32 {
@@ -53,9 +53,9 @@ impl<const M: usize> Innovation<M> {
 }
 
 impl Covariance {
-    /// The innovation of a measurement of `M` axes from its Jacobians by the error states, its innovations, and the
-    /// variance of each axis' noise, which must be positive. The covariance stays as it is. Entries of a Jacobian that
-    /// are zero cost next to nothing.
+    /// Innovation of a measurement of `M` axes from its Jacobians by the error states, its
+    /// innovations, and the noise variance of each axis, which must be positive. Does not change
+    /// the covariance. Zero entries of a Jacobian cost almost nothing.
     #[inline]
     #[must_use]
     pub fn innovation<const M: usize>(
@@ -66,7 +66,7 @@ impl Covariance {
     ) -> Innovation<M> {
         let mut result = Innovation { gain: [[Lanes::zero(); BLOCKS]; M], whitened: innovations };
         for (axis, (jacobian, noise)) in jacobians.iter().zip(variances).enumerate() {
-            // Models touch few blocks of three states: the others are skipped whole.
+            // Models depend on few blocks of three states: skip the others as a whole.
             let blocks = jacobian.as_chunks::<3>().0;
             let dot = |row: &Row| {
                 let mut sum = 0.0;
@@ -84,7 +84,7 @@ impl Covariance {
                     add_rows::<0, 3>(&mut column, [*a, *b, *c], [x, y, z]);
                 }
             }
-            // Decorrelate from the axes before it.
+            // Decorrelate from the preceding axes.
             let mut innovation = result.whitened[axis];
             for before in 0..axis {
                 let earlier = &result.gain[before];
@@ -102,31 +102,34 @@ impl Covariance {
         result
     }
 
-    /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P − D·Dᵀ with
-    /// D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, which goes to
+    /// Updates the covariance with a measurement: P ← P − P·Hᵀ·S⁻¹·H·P, in the square-root form P −
+    /// D·Dᵀ with D = P·Hᵀ·L⁻ᵀ. Returns the correction of the error state, for
     /// [`NominalState::correct`](crate::filter::NominalState::correct).
     ///
-    /// No variance becomes negative, whatever measurements contradict one another. What is subtracted from one that is all but certain may be more
-    /// than there is by its last digit: then a hundred thousandth of it is left, without covariances. Where it is more by far, these
-    /// covariances cannot be: all of them are dropped, and the correction is zero.
+    /// No variance becomes negative, even if measurements contradict each other. If rounding
+    /// removes slightly more than a variance, a hundred-thousandth of it remains, without
+    /// covariances. If far more is removed, the covariances were invalid: all of them are dropped
+    /// and the correction is zero.
     ///
-    /// Must follow [`Self::innovation`] directly: its gain is that of the covariance at that moment.
+    /// Must directly follow [`Self::innovation`], because the gain belongs to the covariance at
+    /// that moment.
     #[inline]
     pub fn update<const M: usize>(&mut self, innovation: &Innovation<M>) -> [f32; N] {
         self.try_update(innovation).unwrap_or([0.0; N])
     }
 
-    /// The same; `None` where covariances that cannot be are dropped, and nothing is learnt.
+    /// The same, but returns `None` if invalid covariances were dropped and the measurement had no
+    /// effect.
     #[inline]
     pub fn try_update<const M: usize>(&mut self, innovation: &Innovation<M>) -> Option<[f32; N]> {
         self.update_with::<M, VECTORS>(innovation)
     }
 
-    /// Takes an update back for states that are only considered (Schmidt, "Application of State-Space Methods to Navigation Problems",
-    /// 1966): what they may be wrong by has counted in the innovation, and the measurement corrects neither them nor their
-    /// covariance.
+    /// Reverts an update for states that are only considered (Schmidt, "Application of State-Space
+    /// Methods to Navigation Problems", 1966): their uncertainty enters the innovation, but neither
+    /// they nor their covariance are corrected.
     ///
-    /// Must follow [`Self::try_update`] with this innovation, which returned this correction, directly.
+    /// Must directly follow [`Self::try_update`] with this innovation; `correction` is its result.
     #[inline]
     pub fn consider<const M: usize, const K: usize>(
         &mut self,
@@ -134,7 +137,7 @@ impl Covariance {
         states: [usize; K],
         correction: &mut [f32; N],
     ) {
-        // Checked, and free where the states are constants: they are inlined.
+        // Checked access, free of cost because the states are constants after inlining.
         let part = |column: &Row, state: usize| {
             let (block, axis) = place(state);
             column.get(block).map_or(0.0, |lanes| lanes.get(axis))
@@ -146,7 +149,7 @@ impl Covariance {
                     self.change(i, j, |before| before + of * part(column, j));
                 }
             }
-            // What is no number stays to be seen.
+            // A correction that is not finite stays visible to the caller's health check.
             if let Some(cell) = correction.get_mut(i).filter(|cell| cell.is_finite()) {
                 *cell = 0.0;
             }
@@ -159,7 +162,7 @@ impl Covariance {
         innovation: &Innovation<M>,
     ) -> Option<[f32; N]> {
         let Innovation { gain, whitened } = innovation;
-        // A NaN must not spread into the covariance: any NaN makes the sum one.
+        // A NaN must not reach the covariance. Any NaN makes the sum NaN.
         let sum = gain.iter().flatten().fold(Lanes::zero(), |sum, lanes| sum + *lanes);
         if sum.to_array().iter().sum::<f32>().is_nan() {
             return Some([f32::NAN; N]);
@@ -173,8 +176,8 @@ impl Covariance {
         if !WHOLE {
             self.mirror::<BLOCKS>();
         }
-        // Bits instead of comparisons, two instructions less for each: the first one of a negative number is set. One that is zero is lifted to
-        // its floor in the next step.
+        // Test the sign bit of all variances at once, two instructions less per variance than
+        // comparisons. A zero variance is raised to its floor by the next propagation.
         if self.variances().fold(0, |bits, variance| bits | variance.to_bits()) > i32::MAX as u32 && self.repair(gain) {
             return None;
         }
@@ -186,8 +189,8 @@ impl Covariance {
         Some([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o])
     }
 
-    /// Replaces variances of which this gain has taken more than there was. Was it more than rounding can take? Then nothing has been learnt.
-    // Hardly ever, and one for all numbers of axes.
+    /// Repairs variances from which this gain has removed more than there was. Returns true if
+    /// rounding cannot explain it; the measurement then has no effect.
     #[cold]
     #[inline(never)]
     fn repair(&mut self, gain: &[Row]) -> bool {
@@ -196,14 +199,15 @@ impl Covariance {
             gain.iter().filter_map(|column| column.get(block)).map(|lanes| lanes.get(axis) * lanes.get(axis)).sum()
         });
         let states = || taken.into_iter().enumerate();
-        // What has overflowed is no number, and that is not rounding either.
+        // An overflow gives NaN, which rounding does not explain either.
         let cannot_be =
             !states().all(|(state, taken)| self.get(state, state) >= -ROUNDING * (self.get(state, state) + taken));
         for (state, taken) in states() {
             let left = self.get(state, state);
             let before = left + taken;
             if cannot_be {
-                // So much may have been taken that what there was is lost.
+                // The removed part may be so large that the variance before the update cannot be
+                // recovered.
                 let is_known = before.is_finite() && before > ROUNDING * taken;
                 self.reset(state, if is_known { before } else { LOST });
             } else if left <= 0.0 {
@@ -214,8 +218,8 @@ impl Covariance {
     }
 }
 
-/// Subtracts w·wᵀ of each column w of the gain from the rows of this block: from all of them, or from the diagonal on. The products
-/// are the same on both sides of it.
+/// Subtracts w·wᵀ of each gain column w from the rows of this block: whole rows, or from the
+/// diagonal on. The products are the same on both sides of the diagonal.
 #[inline(always)]
 fn subtract_outer_products<const BLOCK: usize, const WHOLE: bool, const M: usize>(
     rows: &mut [Row; 3],
