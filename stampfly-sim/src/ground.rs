@@ -201,7 +201,7 @@ impl<H: VehicleActions> Ground<H> {
         self.identity
     }
 
-    /// Cockpit of the vehicle for one call of a service.
+    /// Access to the vehicle for one call of a service.
     pub fn seated<'s>(&'s mut self, samples: &'s dyn Samples) -> ArbitratedAccess<'s> {
         let Self { arbiter, places, actions, .. } = self;
         ArbitratedAccess { arbiter, actions, view: View::new(samples, places) }
