@@ -26,6 +26,10 @@
 //! Call [`Monitor::step`] once per estimator step, after the estimate; time is an argument. The
 //! crate has no clock and allocates nothing.
 //!
+//! ```
+//! use stampfly_monitor::{Monitor, MonitorConfig, MonitorInput};
+//! use stampfly_types::{Instant, messages::{EstimatorStatus, Finding, StateEstimate}};
+//!
 //! let mut monitor = Monitor::new(MonitorConfig::default());
 //! let input = MonitorInput {
 //!     imu: &[], flow: &[], tof: &[], baro: &[],

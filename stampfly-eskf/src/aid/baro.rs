@@ -48,8 +48,8 @@ pub fn wash(floor: f32, height: f32) -> f32 {
 /// ```
 /// use stampfly_eskf::aid::baro::Offset;
 /// let mut offset = Offset::new(120.0, 0.1);
-/// // Ten minutes at 0.02 m/√s: a standard deviation of 0.5 m, so an innovation of 0.5 m is mostly
-/// drift.
+/// // Ten minutes at 0.02 m/√s: a standard deviation of 0.5 m, so an innovation of 0.5 m
+/// // is mostly drift.
 /// offset.propagate(600.0, 0.02);
 /// offset.update(0.5, 0.01);
 /// assert!((offset.value() - 120.45).abs() < 0.05);
