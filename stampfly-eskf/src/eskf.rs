@@ -120,8 +120,8 @@ impl Mean {
 /// it the history for late measurements. See [`Estimator`] for the call order.
 ///
 /// # Timing
-/// `predict` costs the same at every sample except that every fourth one at 400 Hz propagates the
-/// covariance. To bound the cost of a step with many new samples use [`Pacer`](crate::Pacer).
+/// A `predict` that propagates the covariance, every fourth one at 400 Hz, costs more than the
+/// others. To bound the cost of a step with many new samples use [`Pacer`](crate::Pacer).
 ///
 /// ```
 /// use stampfly_eskf::{Eskf, EskfConfig, Estimator};
@@ -591,6 +591,9 @@ impl Eskf {
     /// Applies the pseudo-measurements. Their conditions are listed in `pseudo_measurements.rs`.
     #[inline(never)]
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
+        // Exactly one source applies: gravity and drag need the accelerometer, a stationary vehicle
+        // has no acceleration of its own, and in flight a measured velocity observes the tilt
+        // better than gravity.
         if self.command.accel_faulty {
             self.go_on_unfelt(dt);
         } else if self.anchor.is_some() {

@@ -152,6 +152,7 @@ impl Altimeter {
                 (self.age, self.restarted, self.unfollowed) = (SETTLED - SETTLES, true, 0.0);
             }
         } else {
+            // Gains of three coincident poles at −1/follows.
             let follows = if self.age < FIRST { FOLLOWS_FIRST } else { FOLLOWS };
             let rate = dt / follows;
             self.height += 3.0 * rate * off;

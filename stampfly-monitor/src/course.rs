@@ -170,6 +170,7 @@ impl Course {
         if explains(straight) && camera > BETTER * straight {
             return Explanation::Tilt;
         }
+        // A burst before a shift, because it has fewer parameters.
         let large = size > LARGE * limits.noise;
         let last = points.last().map_or(0.0, |point| point.time);
         if let Some(burst) = best_burst(points, tilt) {

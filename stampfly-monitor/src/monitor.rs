@@ -182,6 +182,7 @@ impl Monitor {
         self.hypotheses.ask(&mut answers, config, &seen);
         let Answers { fits, correction, .. } = answers;
         let elapsed = [flow.map_or(0.0, |flow| flow.interval), range.map_or(0.0, |range| range.dt)];
+        // The range was still accepted at the start of this step, so this is a new finding.
         if trusted.range && self.findings.range.finding != Finding::None {
             self.begin_without_range(now);
         }

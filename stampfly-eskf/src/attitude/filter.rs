@@ -162,6 +162,7 @@ impl AttitudeFilter {
             self.level = upwards(accel).unwrap_or_default();
         }
         self.rate = gyro - self.bias.value();
+        // Two half rotations, because the force below needs the attitude at the middle of the step.
         let half = from_vector(&(self.rate * (0.5 * dt)));
         let middle = product(&self.strapdown, &half);
         self.strapdown = product(&middle, &half);

@@ -228,6 +228,7 @@ impl EllipsoidFit {
         } else if (field - self.last).norm() < self.config.spacing {
             return Err(MagRefusal::TooNear);
         }
+        // Relative to the first sample, so that a large hard iron costs no precision.
         let from_origin = field - self.origin;
         let [_, strongest] = self.config.strength_range;
         if from_origin.amax() > 2.0 * strongest * self.config.stretch_max {

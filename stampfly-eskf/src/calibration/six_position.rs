@@ -185,6 +185,7 @@ impl SixPosition {
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
+                // Only motion allows the next hold: otherwise one position would be counted twice.
                 self.taken &= reason == NotStill::NotFinite;
                 Err(SixPositionRefusal::Moving(reason))
             }

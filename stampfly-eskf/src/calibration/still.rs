@@ -79,6 +79,7 @@ impl StillCalibration {
             step = Err(NotStill::Frozen);
         }
         self.result.progress = self.average.progress();
+        // Count only interruptions of a collection, not every moving sample.
         if step.is_err() && begun && self.result.progress == 0.0 {
             self.result.restarts = self.result.restarts.wrapping_add(1);
         }

@@ -120,6 +120,8 @@ impl Eskf {
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 self.aided(&axes.given);
+                // Apply the jump to the present state: the change since the measurement is known
+                // from the inertial sensor.
                 self.state.velocity += Vec3::from(axes.measured) - delayed.state.velocity;
                 for axis in 0..3 {
                     if axes.given[axis] {
@@ -250,6 +252,7 @@ impl Eskf {
             Step::Window => self.follow(delayed, axes),
             Step::Found { turn, sigma } => {
                 self.turn_to_north(turn, sigma);
+                // The rotation of the world frame has changed the delayed state, too.
                 let Some(delayed) = &self.state_at(delayed.age) else { return };
                 self.follow(delayed, axes);
             }
@@ -283,6 +286,7 @@ impl Eskf {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
+                // Carry the measured attitude to the present by the rotation since then.
                 self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
                 self.reset_history();
                 for axis in 0..3 {

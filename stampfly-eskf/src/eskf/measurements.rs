@@ -86,6 +86,7 @@ impl Eskf {
             return Err(Refusal::Implausible);
         }
         self.range_used = self.now;
+        // The first range in flight defines the surface instead of correcting the height.
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
         // The beam is a cone and reports the nearest surface in it: on a tilted body anything

@@ -7,9 +7,9 @@
 //! - **Turn too fast for flow**: inflates the tilt.
 //! - **Finding of a monitor** ([`correct`](crate::Estimator::correct)): corrects attitude, velocity
 //!   and biases.
-//! - **[`check_health`](Eskf::check_health)**: a state that is not finite, an unsound covariance,
-//!   or motion beyond any flight. Restarts position and velocity, on the ground everything, and
-//!   reports divergence.
+//! - **[`check_health`](Eskf::check_health)**: a state that is not finite or an unsound covariance
+//!   restarts position and velocity, on the ground everything, and reports divergence. A position or
+//!   velocity beyond any flight only reports divergence; the caller may then command a full reset.
 
 use super::*;
 

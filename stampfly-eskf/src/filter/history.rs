@@ -170,6 +170,7 @@ impl History {
                 step.prepend(interval.length, interval.delta_velocity);
                 continue;
             }
+            // The oldest interval is used in part, with constant rate and force.
             step.prepend(left, interval.delta_velocity * (left / interval.length));
             let to_end = multiply(conjugate(interval.turned), self.turned());
             step.delta_rotation = multiply(small_rotation(interval.rate * left), to_end);

@@ -40,6 +40,8 @@ impl Hypothesis for FlowStill {
         if self.zeros < config.flow_zeros {
             return Opinion::Unknown;
         }
+        // Both: enough rotation for the camera to resolve, and more than the vehicle may move
+        // unnoticed.
         if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
             Opinion::Holds(seen.back_to_before(self.zeros as f32 * flow.interval))
         } else {

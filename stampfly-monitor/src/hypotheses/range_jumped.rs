@@ -40,6 +40,7 @@ impl Hypothesis for RangeJumped {
 
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
         let Some(range) = seen.range.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
+        // Left out: test for agreement only, which clears the finding.
         if !seen.trusts_range {
             let agrees = (range.distance - range.expected).abs() < AGREES
                 && !range.jumps
