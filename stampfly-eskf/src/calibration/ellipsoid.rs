@@ -165,7 +165,7 @@ const DIRECTIONS: [[f32; 3]; 13] = [
 /// use stampfly_types::{Vec3, math};
 /// let mut fit = EllipsoidFit::default();
 /// for k in 0..400 {
-/// // A spiral over the sphere, 48 µT, shifted and stretched.
+///     // A spiral over the sphere, 48 µT, shifted and stretched.
 ///     let z = 1.0 - k as f32 / 200.0;
 ///     let (sin, cos) = math::sin_cos(k as f32 * 0.5);
 ///     let across = math::sqrt(1.0 - z * z);

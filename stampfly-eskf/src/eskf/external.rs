@@ -333,10 +333,10 @@ impl Eskf {
     ///     if k % 10 != 0 {
     ///         continue;
     ///     }
-    /// // A wheel, m/s: the velocity along body x, and no sideways slip along y.
+    ///     // A wheel, m/s: the velocity along body x, and no sideways slip along y.
     ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
     ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
-    /// // A range to a beacon, m, a fifth of a second late.
+    ///     // A range to a beacon, m, a fifth of a second late.
     ///     let range = |state: &NominalState| {
     ///         let away = state.position - beacon;
     ///         let distance = away.norm().max(0.1);
