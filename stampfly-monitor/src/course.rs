@@ -24,8 +24,8 @@ const STRETCH: f32 = 0.125;
 const POINTS: usize = 24;
 /// Largest slope of the line, in standard deviations of the reckoner's acceleration.
 const TILT_SIGMAS: f32 = 2.0;
-/// Smallest number of points since t₀ for a shift (up to three parameters per axis), a burst (two),
-/// any of the two in all, and a camera fault (none).
+/// Smallest numbers of points: since t₀ for a shift (up to three parameters per axis) and for a
+/// burst (two), in all for either of them, and since t₀ for a camera fault (no parameter).
 const SHORTEST: usize = 6;
 const SHORTEST_BURST: usize = 4;
 const ENOUGH: usize = 9;

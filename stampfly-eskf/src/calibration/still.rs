@@ -29,7 +29,7 @@ pub struct StillQuality {
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut calibration = StillCalibration::default();
 /// for k in 0..1500 {
-///     // A sensor has noise. One that repeats a value is faulty, and the calibration never completes.
+///     // A sensor has noise. With one that repeats a value the calibration never completes.
 ///     let noise = Vec3::repeat(if k % 2 == 0 { 1e-3 } else { -1e-3 });
 ///     let accel = Vec3::new(0.0, 0.0, -9.81) + noise;
 ///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0, ..Default::default() };
