@@ -399,6 +399,7 @@ impl Eskf {
         if age > self.config.horizon {
             return Err(Refusal::Stale);
         }
+        // Clocks of sensors differ slightly, so a small lead is accepted and extrapolated.
         if age < -MAX_AHEAD {
             return Err(Refusal::Future);
         }
@@ -511,6 +512,7 @@ impl Eskf {
         };
         self.tallies.add(sensor, fusion);
         if let Some(offered) = self.status.offered.get_mut(counter as usize) {
+            // These counters wrap; readers take differences.
             *offered = offered.wrapping_add(1);
         }
         if matches!(fusion, Fusion::Gated { .. })
@@ -548,6 +550,7 @@ impl Eskf {
     fn acceleration_sigma(&self) -> f32 {
         let variance = |turn: usize, axis: usize, sign: f32| {
             let p = |i: usize, j: usize| self.covariance.get(i, j);
+            // Variance of g·θ + b: a rotation about y shifts gravity into x, one about x into −y.
             let (turn, bias) = (ATTITUDE + turn, ACCEL_BIAS + axis);
             GRAVITY * (GRAVITY * p(turn, turn) + 2.0 * sign * p(turn, bias)) + p(bias, bias)
         };

@@ -162,6 +162,8 @@ impl Course {
         let size = leaves(points, |point| point.apart, tilt);
         let Some(shift) = best_shift(points, tilt) else { return Explanation::Unclear };
         let offset = Some(offset(points, tilt)).filter(|left| *left < TOLD * size);
+        // The camera fault closest to the data: one of `FAULTS`, or an offset if it explains
+        // enough.
         let fault = best_fault(points, tilt, limits.heading).min(offset.unwrap_or(f32::MAX));
         let (camera, gyro) = (limits.noise + fault, limits.noise + shift.left);
         let straight = limits.noise + leaves(points, |point| point.apart, limits.tilt);

@@ -15,8 +15,8 @@
 //!   altitude.
 //! - **Reset**: rejected for longer than `lockout`. With another source of height (range, receiver,
 //!   ground) the offset is set to the altitude and the state is unchanged; not counted towards
-//!   divergence. Without one the height is set to an altitude within 2 m, and a larger residual stays
-//!   rejected.
+//!   divergence. Without one the height is set to an altitude within 2 m, and a larger residual
+//!   stays rejected.
 //! - **Take-off**: starting propellers change the pressure. The offset's variance grows by
 //!   `baro_wash`², and so does the noise near the floor ([`wash`]).
 //! - **Origin reset by command**: the offset moves with the origin.

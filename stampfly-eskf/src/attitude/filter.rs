@@ -186,6 +186,7 @@ impl AttitudeFilter {
         let config = &self.config;
         if self.stationary.is_stationary(config) {
             self.bias.update_stationary(config, &self.stationary.rate(), dt);
+        // Before the low-pass has settled its derivative is zero and holds no information.
         } else if self.force.is_settled() {
             let leaning = self.level * Vec3::from(*self.force.rate());
             let norm = self.force.value().norm().max(1.0);

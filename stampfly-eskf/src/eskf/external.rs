@@ -142,6 +142,7 @@ impl Eskf {
         if axes.are_beyond(FARTHEST[POSITION]) {
             return Err(Refusal::Implausible);
         }
+        // The first fix of an axis defines its position; a gate could not test it.
         let first = core::array::from_fn::<_, 3, _>(|axis| axes.given[axis] && self.is_nowhere(axis));
         if !self.is_north_known() || first.contains(&true) {
             // Without a heading the inertial sensor cannot propagate the position from fix to fix:

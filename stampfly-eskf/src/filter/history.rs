@@ -143,6 +143,7 @@ impl History {
             newest.length = length;
             return;
         }
+        // Normalised once per interval, against the drift of the running product.
         let turned = normalize(multiply(self.turned(), motion.delta_rotation));
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.intervals.get_mut(self.newest) {

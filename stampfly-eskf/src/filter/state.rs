@@ -110,6 +110,7 @@ impl NominalState {
     /// Whether every number is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
+        // Any NaN or infinity makes the sum not finite.
         let sum = self.position.sum() + self.velocity.sum() + self.gyro_bias.sum() + self.accel_bias.sum();
         (sum + self.attitude.iter().sum::<f32>()).is_finite()
     }

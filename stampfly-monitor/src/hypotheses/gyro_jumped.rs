@@ -141,6 +141,7 @@ impl GyroJumped {
         if squared(before) + squared(after) > FLAT * FLAT * size || ramp > RAMP * size {
             return None;
         }
+        // The middle between the second and the third newest sample at 400 Hz.
         let since = *at - Duration::from_micros(3_750);
         let is_low = self.low.is_some_and(|low| at.since(low) < LOW);
         if is_low && self.blow < FELT * FELT * size {
@@ -177,6 +178,7 @@ impl GyroJumped {
         let body = seen.estimate.attitude.inverse_transform_vector(&grown.horizontal());
         let excess = [flow.rate[1] + body.y / flow.distance, -flow.rate[0] - body.x / flow.distance];
         let from = seen.now - LATE - Duration::from_seconds(flow.interval);
+        // Its frames were taken before the jump.
         if from < examination.since {
             return None;
         }

@@ -95,6 +95,7 @@ impl RangeWrapped {
     /// Takes the change of the upward velocity within `dt` seconds, bias included, and the
     /// estimated climb rate, m/s.
     fn felt(&mut self, change: f32, climb: f32, dt: f32) {
+        // A leaky integral: errors of the bias do not accumulate beyond `GAINS` seconds.
         self.gained += change - (self.bias + self.gained * (1.0 / GAINS)) * dt;
         self.believed = climb;
     }
