@@ -10,7 +10,8 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// See the module documentation.
+/// Tests whether the camera shows no motion while the body turns. Details are at the head of the
+/// file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStill {

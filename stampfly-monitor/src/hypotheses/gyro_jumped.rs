@@ -70,7 +70,8 @@ struct Found {
     velocity: Vec3,
 }
 
-/// See the module documentation.
+/// Tests whether the gyro's zero jumps between two samples, by the image of the floor. Details are
+/// at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroJumped {

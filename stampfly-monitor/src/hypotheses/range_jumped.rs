@@ -24,7 +24,8 @@ const AGREES: f32 = 0.15;
 /// Number of repetitions from which a reading does not count as agreement.
 const REPEATED: u32 = 15;
 
-/// See the module documentation.
+/// Tests whether the range jumps and stays there without an edge below; also clears the range.
+/// Details are at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeJumped {
