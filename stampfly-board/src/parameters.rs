@@ -3,9 +3,9 @@
 //! Each has its meaning, name, field, range and unit. Ranges exclude what no vehicle could fly with
 //! alone, and [`rules`](crate::rules) what it could not fly with together. Defaults are the fields'
 //! own. The log stores every value, so a replay flies with the parameters of the flight.
-//! [`stampfly_param::parameters`] finds and changes them by name. Those marked `in_flight` are
-//! factors that a loop applies afresh in every step: none is part of a state, a limit or a
-//! protection of the vehicle.
+//! [`stampfly_param::parameters`](mod@stampfly_param::parameters) finds and changes them by name.
+//! Those marked `in_flight` are factors that a loop applies afresh in every step: none is part of a
+//! state, a limit or a protection of the vehicle.
 //!
 //! ```
 //! use stampfly_param::parameters;

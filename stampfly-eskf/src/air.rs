@@ -100,6 +100,7 @@ impl Air {
             if !data.pressure.is_finite() {
                 continue;
             }
+            // Bernoulli: p = ρ·v²/2. Noise around zero gives negative pressures.
             let speed = math::sqrt(2.0 * data.pressure.max(0.0) / self.density());
             self.tube = Some((*at, speed));
             if self.believed && speed > SLOW && !on_ground && is_moving {

@@ -232,6 +232,7 @@ impl Estimator for Complementary {
         }
         let Some(surface) = self.surface else { return Fusion::Refused(Refusal::Missing) };
         let rotation = self.state.rotation();
+        // The lower bound keeps the division finite beyond 60° of tilt.
         let distance = (surface - self.state.position.z) / rotation[2][2].max(0.5);
         let rate = [flow.delta_x / flow.interval, flow.delta_y / flow.interval];
         let measured = crate::aid::flow::measured_velocity(rate, [self.rate.x, self.rate.y], distance);

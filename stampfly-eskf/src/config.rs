@@ -135,7 +135,8 @@ pub struct EskfConfig {
     /// Innovation gate, in standard deviations of one axis.
     pub gate: f32,
     /// Lock-out time, s: when every measurement of a sensor has been rejected for this long, the
-    /// state is reset to that sensor. Applies to range, flow, barometer, magnetometer and gravity.
+    /// state is reset to that sensor. Applies to range, flow, barometer, magnetometer and, four
+    /// times as long, gravity.
     pub lockout: f32,
     /// Lock-out time of external position, velocity and attitude, s. A receiver between walls is
     /// wrong for seconds.

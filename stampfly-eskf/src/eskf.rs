@@ -120,8 +120,8 @@ impl Mean {
 /// it the history for late measurements. See [`Estimator`] for the call order.
 ///
 /// # Timing
-/// `predict` costs the same at every sample except that every fourth one at 400 Hz propagates the
-/// covariance. To bound the cost of a step with many new samples use [`Pacer`](crate::Pacer).
+/// A `predict` that propagates the covariance, every fourth one at 400 Hz, costs more than the
+/// others. To bound the cost of a step with many new samples use [`Pacer`](crate::Pacer).
 ///
 /// ```
 /// use stampfly_eskf::{Eskf, EskfConfig, Estimator};
@@ -399,6 +399,7 @@ impl Eskf {
         if age > self.config.horizon {
             return Err(Refusal::Stale);
         }
+        // Clocks of sensors differ slightly, so a small lead is accepted and extrapolated.
         if age < -MAX_AHEAD {
             return Err(Refusal::Future);
         }
@@ -511,6 +512,7 @@ impl Eskf {
         };
         self.tallies.add(sensor, fusion);
         if let Some(offered) = self.status.offered.get_mut(counter as usize) {
+            // These counters wrap; readers take differences.
             *offered = offered.wrapping_add(1);
         }
         if matches!(fusion, Fusion::Gated { .. })
@@ -548,6 +550,7 @@ impl Eskf {
     fn acceleration_sigma(&self) -> f32 {
         let variance = |turn: usize, axis: usize, sign: f32| {
             let p = |i: usize, j: usize| self.covariance.get(i, j);
+            // Variance of g·θ + b: a rotation about y shifts gravity into x, one about x into −y.
             let (turn, bias) = (ATTITUDE + turn, ACCEL_BIAS + axis);
             GRAVITY * (GRAVITY * p(turn, turn) + 2.0 * sign * p(turn, bias)) + p(bias, bias)
         };
@@ -591,6 +594,9 @@ impl Eskf {
     /// Applies the pseudo-measurements. Their conditions are listed in `pseudo_measurements.rs`.
     #[inline(never)]
     fn apply_pseudo_measurements(&mut self, accel: Vec3, dt: f32) {
+        // Exactly one source applies: gravity and drag need the accelerometer, a stationary vehicle
+        // has no acceleration of its own, and in flight a measured velocity observes the tilt
+        // better than gravity.
         if self.command.accel_faulty {
             self.go_on_unfelt(dt);
         } else if self.anchor.is_some() {

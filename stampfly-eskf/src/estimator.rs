@@ -91,7 +91,7 @@ pub trait Estimator {
     /// Starts, or restarts, from a still calibration. Position and velocity become zero.
     fn initialize(&mut self, at: Instant, calibration: &CalibrationResult);
 
-    /// Takes the commands of the mode machine: on the ground, flying, resets.
+    /// Takes the commands of the mode machine: on the ground, flying, accelerometer fault, resets.
     fn command(&mut self, at: Instant, command: &EstimatorCommand);
 
     /// Propagates the estimate to `at` with an inertial sample.
@@ -170,6 +170,7 @@ pub trait Estimator {
     fn heed(&mut self, _at: Instant, _findings: &SensorFindings) {}
 
     /// Applies a monitor's correction: removes the effect of a faulty sensor on the estimate.
+    /// The default implementation ignores it.
     fn correct(&mut self, _at: Instant, _correction: &EstimateCorrection) {}
 
     /// The state, with the validity of each output.

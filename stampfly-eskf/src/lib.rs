@@ -1,20 +1,23 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The parts
-//! State estimation for small vehicles.
+//! # Which estimator
 //!
 //! | estimator | use it for | size | not for |
 //! |---|---|---|---|
-//! | [`Eskf`] | flying and rolling on inertial sensor, flow, range, barometer, magnetometer, motion capture, satellite receiver, sensors of your own | 6.5 kB, a third of it the memory for late measurements | – |
+//! | [`Eskf`] | position and attitude from inertial sensor and aiding sensors | 6.5 kB | – |
 //! | [`Complementary`] | the same where memory and time are short | 0.4 kB | aggressive flight |
-//! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude without position sensors, field bent or not | 1.2 kB | position, velocity |
-//! | [`Mahony`](attitude::Mahony) | the least that levels a multirotor | 20 bytes | unknown gyro bias, heading |
+//! | [`AttitudeFilter`](attitude::AttitudeFilter) | attitude only, distorted fields | 1.2 kB | position, velocity |
+//! | [`Mahony`](attitude::Mahony) | levelling a multirotor | 20 bytes | unknown gyro bias, heading |
 //!
-//! [`calibration`] finds what the sensors do wrong before they are used: bias, scale, hard and soft iron, trim, drift
-//! with temperature.
+//! All but the last implement [`Estimator`]. A third of the size of [`Eskf`] is the history for
+//! late measurements. [`calibration`] finds the errors of the sensors before they are used: bias,
+//! scale, hard and soft iron, trim, drift with temperature.
 //!
-//! All but the last implement [`Estimator`]. They need no allocation and no other crate of the family than
-//! `stampfly-types`, and give the same bits on every machine.
+//! # Conventions
+//!
+//! World frame NED, body frame FRD, attitude body → world. SI units: m, s, rad; magnetic fields in
+//! µT, temperatures in °C. Standard deviations are one sigma. Time is an argument; no estimator
+//! reads a clock. Values that are not finite are refused and never reach a state.
 #![no_std]
 
 #[cfg(test)]
@@ -41,9 +44,9 @@ pub use eskf::Eskf;
 pub use estimator::{Estimator, Fusion, Refusal};
 pub use level::attitude_from_specific_force;
 pub use measurements::{Aiding, Measurements, feed};
-/// Its matrices are in signatures here.
+/// Re-exported because its matrices appear in signatures.
 pub use nalgebra;
 pub use pacer::Pacer;
-/// Messages, time, vectors: the words that signatures here are written in.
+/// Messages, time and vectors: the types of the signatures.
 pub use stampfly_types as types;
 pub use tally::Tally;

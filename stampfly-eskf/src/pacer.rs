@@ -58,6 +58,7 @@ impl Pacer {
     ) {
         let Measurements { imu, tof, flow, mag, baro, pose } = *measurements;
         feed(estimator, &Measurements { imu, tof, flow, pose, ..Measurements::default() }, &mut fused);
+        // A step that has fused one of these has no time for another update.
         let mut has_time = tof.is_empty() && flow.is_empty() && pose.is_empty();
         next(&mut self.mag, mag, &mut has_time, |Stamped { at, data, .. }| {
             fused(Aiding::Mag, at, estimator.fuse_mag(at, &data));
@@ -78,6 +79,7 @@ fn next<T: Copy>(
     mut fuse: impl FnMut(Stamped<T>),
 ) {
     for sample in new {
+        // A newer sample has arrived: the waiting one must go first, in order.
         if let Some(before) = waiting.replace(*sample) {
             fuse(before);
             *has_time = false;

@@ -5,8 +5,8 @@
 //!
 //! Neither sensor suffices alone. Vibration shifts the accelerometer's zero by up to 2 m/s² as the
 //! thrust changes. A door changes the pressure by 18 Pa within a second, which is 1.5 m, and
-//! propellers change it, too. No vehicle moves like that without measuring it: if the observer does
-//! not follow the barometer, the pressure has changed, and both restart from there.
+//! propellers change it, too. The accelerometer measures any real motion of that size: if the
+//! observer does not follow the barometer, the pressure has changed, and both restart from there.
 
 use stampfly_types::math;
 
@@ -152,6 +152,7 @@ impl Altimeter {
                 (self.age, self.restarted, self.unfollowed) = (SETTLED - SETTLES, true, 0.0);
             }
         } else {
+            // Gains of three coincident poles at −1/follows.
             let follows = if self.age < FIRST { FOLLOWS_FIRST } else { FOLLOWS };
             let rate = dt / follows;
             self.height += 3.0 * rate * off;

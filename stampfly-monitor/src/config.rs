@@ -33,8 +33,8 @@ pub struct MonitorConfig {
     pub gyro_scale: f32,
 
     /// Scale error of flow between specimens, as a share of the velocity. Recorded cameras have
-    /// scales of 0.79 to 1.11; the part beyond this value fits into the rest of the gate up to 5
-    /// m/s.
+    /// scales of 0.79 to 1.11; up to 5 m/s the part beyond this value fits into the rest of the
+    /// gate.
     pub flow_scale: f32,
     /// Error of a single reading after smoothing, as a share of the image motion. A PMW3901 takes
     /// 121 frames a second and is read 100 times, so a reading holds one frame, two or none. For

@@ -24,8 +24,8 @@ const STRETCH: f32 = 0.125;
 const POINTS: usize = 24;
 /// Largest slope of the line, in standard deviations of the reckoner's acceleration.
 const TILT_SIGMAS: f32 = 2.0;
-/// Smallest number of points since t₀ for a shift (up to three parameters per axis), a burst (two),
-/// any of the two in all, and a camera fault (none).
+/// Smallest numbers of points: since t₀ for a shift (up to three parameters per axis) and for a
+/// burst (two), in all for either of them, and since t₀ for a camera fault (no parameter).
 const SHORTEST: usize = 6;
 const SHORTEST_BURST: usize = 4;
 const ENOUGH: usize = 9;
@@ -162,6 +162,8 @@ impl Course {
         let size = leaves(points, |point| point.apart, tilt);
         let Some(shift) = best_shift(points, tilt) else { return Explanation::Unclear };
         let offset = Some(offset(points, tilt)).filter(|left| *left < TOLD * size);
+        // The camera fault closest to the data: one of `FAULTS`, or an offset if it explains
+        // enough.
         let fault = best_fault(points, tilt, limits.heading).min(offset.unwrap_or(f32::MAX));
         let (camera, gyro) = (limits.noise + fault, limits.noise + shift.left);
         let straight = limits.noise + leaves(points, |point| point.apart, limits.tilt);
@@ -170,6 +172,7 @@ impl Course {
         if explains(straight) && camera > BETTER * straight {
             return Explanation::Tilt;
         }
+        // A burst before a shift, because it has fewer parameters.
         let large = size > LARGE * limits.noise;
         let last = points.last().map_or(0.0, |point| point.time);
         if let Some(burst) = best_burst(points, tilt) {

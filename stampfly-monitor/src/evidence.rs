@@ -298,6 +298,7 @@ impl Recollection {
         let interval = flow.interval;
         let gap = self.compared.replace(now).is_none_or(|last| now.since(last).seconds() > MISSING * interval);
         let raw = self.reckoners.turning();
+        // Body rates about y and x move the image along x and y.
         let turning = [raw.y, -raw.x];
         let [x, y] = status.flow_innovation;
         let square = |value: f32| value * value;

@@ -31,7 +31,8 @@ pub enum Opinion {
 /// One possible fault of one sensor.
 ///
 /// A hypothesis keeps its own state and receives each step once, in order. The monitor acts on the
-/// step in which the fault begins to hold; for [`Finding::Shifted`] on every one.
+/// step in which the hypothesis begins to hold; for [`Finding::Shifted`] on each step in which it
+/// holds.
 pub trait Hypothesis {
     /// The sensor.
     const SENSOR: Sensor;

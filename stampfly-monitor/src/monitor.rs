@@ -1,4 +1,5 @@
-//! [`Monitor`]: computes the evidence, tests every hypothesis, and derives findings and a correction.
+//! [`Monitor`]: computes the evidence, tests every hypothesis, and derives findings and a
+//! correction.
 
 use crate::config::MonitorConfig;
 use crate::evidence::{Evidence, Recollection};
@@ -182,6 +183,7 @@ impl Monitor {
         self.hypotheses.ask(&mut answers, config, &seen);
         let Answers { fits, correction, .. } = answers;
         let elapsed = [flow.map_or(0.0, |flow| flow.interval), range.map_or(0.0, |range| range.dt)];
+        // The range was still accepted at the start of this step, so this is a new finding.
         if trusted.range && self.findings.range.finding != Finding::None {
             self.begin_without_range(now);
         }
@@ -196,6 +198,7 @@ impl Monitor {
     /// estimate.
     fn hold_back(&mut self, now: Instant, input: &MonitorInput<'_>) {
         let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).seconds());
+        // On the ground, tilt and biases are known from gravity and the calibration.
         self.waits = if input.stands { 0.0 } else { math::larger(self.waits - dt, 0.0) };
         self.bridged = math::larger(self.bridged - dt, 0.0);
         if core::mem::replace(&mut self.restarts, input.restarts) != input.restarts && !input.stands {

@@ -126,6 +126,8 @@ impl Reckoner {
         let gained = square(velocity[0] - self.began.x) + square(velocity[1] - self.began.y);
         let turned = square(GRAVITY * config.gyro_scale) * self.swept.norm_squared();
         let drift = 0.5 * self.drift();
+        // Initial velocity; accelerations from tilt, gyro scale and gyro bias, integrated; noise;
+        // heading; scale of the camera.
         square(math::larger(config.velocity_sigma_m_s, self.sigmas.velocity))
             + (self.tilted() + turned + square(drift)) * square(self.age)
             + self.walk
@@ -231,6 +233,7 @@ impl Reckoners {
             if !(data.accel.norm_squared() + data.gyro.norm_squared()).is_finite() {
                 continue;
             }
+            // A clipped reading hides a part of the blow: the velocity after it is unknown.
             gap |= data.accel.iter().any(|force| force.abs() > clips);
             self.elapsed += dt;
             self.rate += data.gyro * dt;
@@ -249,6 +252,7 @@ impl Reckoners {
         let force = core::mem::take(&mut self.force) / dt;
         self.turns = [rate, self.turns[0]];
         let change = force - core::mem::replace(&mut self.before, force);
+        // The change between two blocks measures the noise of their mean force.
         let noise = change.x * change.x + change.y * change.y;
         if stands || !self.has_begun {
             self.begin(estimate, sigmas(), stands);

@@ -153,6 +153,7 @@ impl Vertical {
             self.altimeter.stand(-estimate.accel_bias.z);
             return None;
         }
+        // The estimate is usable only while ranges are accepted and not frozen.
         let believed = (self.rejected.is_none() && trusts_range && self.repeats < 6)
             .then_some([-estimate.velocity.z, -estimate.accel_bias.z]);
         self.altimeter.predict(dt, up, believed);

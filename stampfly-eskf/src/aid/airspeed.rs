@@ -39,8 +39,8 @@ pub fn along_nose(state: &NominalState, [north, east]: [f32; 2]) -> Row {
 /// ```
 /// use stampfly_eskf::aid::airspeed::Wind;
 /// let mut wind = Wind::default();
-/// // Over ground at 12 m/s, the airspeed is 15 to the north and 12 to the east: wind from the
-/// // north, 3 m/s.
+/// // At 12 m/s over ground the airspeed is 15 m/s to the north and 12 m/s to the east:
+/// // wind from the north, 3 m/s.
 /// for _ in 0..200 {
 ///     wind.learn(0.1, [1.0, 0.0], 12.0 - 15.0, 0.25);
 ///     wind.learn(0.1, [0.0, 1.0], 12.0 - 12.0, 0.25);

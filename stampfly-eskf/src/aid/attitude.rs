@@ -9,8 +9,9 @@
 //! - **Start**: initialised, finite, new, at most `horizon` old.
 //! - **Continue**: the same, and a joint test ratio of the three axes of at most one.
 //! - **Stop**: no further condition. Inactive one second after the last accepted sample.
-//! - **Reset**: rejected for longer than `external_lockout`. The attitude is set to the sample, the
-//!   history is cleared, the attitude variance is reset, velocity and gyro bias are inflated.
+//! - **Reset**: rejected for longer than `external_lockout`, and at the first sample while the
+//!   heading is unknown. The attitude is set to the sample, the history is cleared, the attitude
+//!   variance is reset, velocity and gyro bias are inflated.
 
 use super::Row;
 use crate::filter::ATTITUDE;

@@ -13,8 +13,10 @@
 //!   younger than two seconds.
 //! - **Stop**: not finite or not new, refused at once. Inactive one second after the last accepted
 //!   altitude.
-//! - **Reset**: rejected for longer than `lockout`. The offset is set to the altitude, the state is
-//!   unchanged. Not counted towards divergence.
+//! - **Reset**: rejected for longer than `lockout`. With another source of height (range, receiver,
+//!   ground) the offset is set to the altitude and the state is unchanged; not counted towards
+//!   divergence. Without one the height is set to an altitude within 2 m, and a larger residual
+//!   stays rejected.
 //! - **Take-off**: starting propellers change the pressure. The offset's variance grows by
 //!   `baro_wash`², and so does the noise near the floor ([`wash`]).
 //! - **Origin reset by command**: the offset moves with the origin.
@@ -48,8 +50,8 @@ pub fn wash(floor: f32, height: f32) -> f32 {
 /// ```
 /// use stampfly_eskf::aid::baro::Offset;
 /// let mut offset = Offset::new(120.0, 0.1);
-/// // Ten minutes at 0.02 m/√s: a standard deviation of 0.5 m, so an innovation of 0.5 m is mostly
-/// // drift.
+/// // Ten minutes at 0.02 m/√s: a standard deviation of 0.5 m, so an innovation of 0.5 m
+/// // is mostly drift.
 /// offset.propagate(600.0, 0.02);
 /// offset.update(0.5, 0.01);
 /// assert!((offset.value() - 120.45).abs() < 0.05);

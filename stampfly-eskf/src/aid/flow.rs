@@ -12,11 +12,11 @@
 //!
 //! Conditions in [`Eskf`](crate::Eskf):
 //! - **Start**: valid, quality of at least `flow_min_quality`, an interval of 1 to 100 ms, tilt
-//!   within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m and
-//!   half the distance, a distance of at least 0.02 m, and of `flow_min_distance` until the flight
-//!   has once reached it.
-//! - **Image motion**: either the measured or the predicted motion may reach `flow_max_rate`, the
-//!   other one half of it.
+//!   within `min_cos_tilt`, a known surface, a height whose standard deviation is below 0.1 m plus
+//!   half the distance, a distance of at least 0.02 m, and in a commanded flight of at least
+//!   `flow_min_distance` until it has once reached that.
+//! - **Image motion**: refused in flight if the measured or the predicted motion exceeds
+//!   `flow_max_rate` and the other one exceeds half of it, and during and after a turn above it.
 //! - **Continue**: the same, and a joint test ratio of both axes of at most one.
 //! - **Stop**: a condition fails, refused at once. Inactive one second after the last accepted
 //!   sample.

@@ -10,6 +10,7 @@
 //! - **Reset**: rejected for longer than `external_lockout`. The position is set to the sample and
 //!   the surface moves with it; the variances of position and velocity are reset, the attitude is
 //!   inflated.
+//! - **Unknown position or heading**: the position is set to the sample.
 
 use super::Row;
 use crate::filter::{NominalState, POSITION};

@@ -15,6 +15,7 @@
 //!   accepted range.
 //! - **Reset**: rejected for longer than `lockout`. The height is set to the range; the variances
 //!   of height and climb rate are reset, the vertical accelerometer bias is inflated.
+//!   If the first rejected range had jumped, the surface is moved instead of the vehicle.
 
 use super::Row;
 use crate::filter::state::Rotation;

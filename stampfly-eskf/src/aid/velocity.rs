@@ -10,6 +10,7 @@
 //! - **Stop**: no further condition. Inactive `aiding_timeout` after the last accepted sample.
 //! - **Reset**: rejected for longer than `external_lockout`. The velocity is set to the sample; its
 //!   variance is reset, the attitude is inflated.
+//! - **Unknown heading**: horizontal velocities are used to find the heading, not fused.
 
 use super::Row;
 use crate::filter::state::rotate_back;

@@ -146,6 +146,7 @@ impl GyroBias {
         let &[r11, r12, r13, r21, r22, r23, r31, r32, r33, bx, by] = self.rotated.value().as_ref();
         let noise = noise(config, config.motion_bias_sigma, dt);
         let [x, y] = leaning;
+        // Two level axes from the tilt rate; the vertical one is only pulled to the calibration.
         self.update(config, &Vec3::new(r11, r12, r13), x + bx, noise);
         self.update(config, &Vec3::new(r21, r22, r23), y + by, noise);
         let vertical = Vec3::new(r31, r32, r33);

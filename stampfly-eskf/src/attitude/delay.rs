@@ -49,6 +49,7 @@ impl MagDelay {
         let taken = self.value(config);
         self.averaged = (self.averaged + dt).min(MEAN_TIME);
         self.mean += (field - self.mean) * (dt / self.averaged);
+        // The deviation from an unfinished mean would contain the rotation itself.
         if self.averaged < MEAN_TIME {
             return;
         }

@@ -162,6 +162,7 @@ impl AttitudeFilter {
             self.level = upwards(accel).unwrap_or_default();
         }
         self.rate = gyro - self.bias.value();
+        // Two half rotations, because the force below needs the attitude at the middle of the step.
         let half = from_vector(&(self.rate * (0.5 * dt)));
         let middle = product(&self.strapdown, &half);
         self.strapdown = product(&middle, &half);
@@ -185,6 +186,7 @@ impl AttitudeFilter {
         let config = &self.config;
         if self.stationary.is_stationary(config) {
             self.bias.update_stationary(config, &self.stationary.rate(), dt);
+        // Before the low-pass has settled its derivative is zero and holds no information.
         } else if self.force.is_settled() {
             let leaning = self.level * Vec3::from(*self.force.rate());
             let norm = self.force.value().norm().max(1.0);

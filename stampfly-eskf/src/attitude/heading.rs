@@ -113,6 +113,7 @@ impl Heading {
         let noise = sigma * sigma * (time / dt).max(1.0);
         let share = self.variance / (self.variance + noise);
         self.value = math::wrap_angle(self.value - share * off);
+        // At rest every sample has the same distortion: do not become more certain than it.
         let least = if stationary { self.variance.min(config.mag_start_sigma * config.mag_start_sigma) } else { 0.0 };
         self.variance = (self.variance * (1.0 - share)).max(least);
         (share, off)

@@ -116,6 +116,7 @@ impl Magnetic {
         let now = Field { strength, dip };
         let follow = (dt / config.mag_reference_time).min(1.0);
 
+        // Compare with the reference, which follows the field slowly while both agree.
         let mut ratio = f32::MAX;
         let mut clean = false;
         if let Some(reference) = &mut self.reference {
@@ -126,6 +127,7 @@ impl Magnetic {
                 reference.follow(&now, follow);
             }
         }
+        // The first reference takes over if it fits better than the present one.
         if let Some(home) = self.home {
             let distance = home.distance(config, &now);
             self.home_agrees_for = if distance < ratio.min(1.0) { self.home_agrees_for + dt } else { 0.0 };
@@ -135,6 +137,7 @@ impl Magnetic {
                 return FieldStatus::ReferenceReturned;
             }
         }
+        // A candidate must stay constant while the body turns.
         match &mut self.candidate {
             Some(candidate) if candidate.distance(config, &now) < 1.0 => {
                 candidate.follow(&now, follow);

@@ -67,6 +67,7 @@ impl Mahony {
             let down = Vec3::new(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z);
             rate += (-accel / norm).cross(&down) * self.gain;
         }
+        // One Euler step of the quaternion derivative ½·q ⊗ (0, rate).
         let change = [
             -x * rate.x - y * rate.y - z * rate.z,
             w * rate.x - z * rate.y + y * rate.z,

@@ -154,6 +154,7 @@ impl Witness {
             return None;
         }
         let before = self.rest.map_or_else(|| bias.known(), |rest| rest.before);
+        // The largest rotation since the start of the rest that fits the gyro.
         let seen = ((rate - before.value()).norm() + 3.0 * before.sigma()) * self.quiet_for;
         if (is - was).abs() > BENT * config.mag_strength_tolerance * was || seen < turn {
             self.first = Some(now);

@@ -165,7 +165,7 @@ const DIRECTIONS: [[f32; 3]; 13] = [
 /// use stampfly_types::{Vec3, math};
 /// let mut fit = EllipsoidFit::default();
 /// for k in 0..400 {
-/// // A spiral over the sphere, 48 µT, shifted and stretched.
+///     // A spiral over the sphere, 48 µT, shifted and stretched.
 ///     let z = 1.0 - k as f32 / 200.0;
 ///     let (sin, cos) = math::sin_cos(k as f32 * 0.5);
 ///     let across = math::sqrt(1.0 - z * z);
@@ -228,6 +228,7 @@ impl EllipsoidFit {
         } else if (field - self.last).norm() < self.config.spacing {
             return Err(MagRefusal::TooNear);
         }
+        // Relative to the first sample, so that a large hard iron costs no precision.
         let from_origin = field - self.origin;
         let [_, strongest] = self.config.strength_range;
         if from_origin.amax() > 2.0 * strongest * self.config.stretch_max {

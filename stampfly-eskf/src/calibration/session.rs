@@ -189,6 +189,8 @@ impl CalibrationSession {
                 }
             }
             Ok(Some((trim, quality))) => {
+                // Reconstruct the uncorrected mean force: `Corrections::accept` applies the
+                // correction of its own.
                 let force = trim.undo(Vec3::new(0.0, 0.0, -GRAVITY - quality.force_error));
                 let Vec3 { x, y, z } = force.component_div(&accel.scale) + accel.bias;
                 let before = self.corrections.level;
@@ -301,6 +303,7 @@ impl CalibrationSession {
             Err(_) => (0.0, Hint::Directions),
         };
         self.report.hint = hint;
+        // Below 1.0 until there is a result.
         self.forward(now, 0.5 * samples + 0.49 * covered.min(1.0));
     }
 }

@@ -142,7 +142,7 @@ const CREEP: f32 = 0.25;
 ///         let measured = force * 1.01 + Vec3::new(0.1, -0.2, 0.3);
 ///         for k in 0..1200 {
 ///             now += Duration::from_micros(2_500);
-/// // It is picked up and turned, then left alone.
+///             // It is picked up and turned, then left alone.
 ///             let gyro = if k < 100 { Vec3::new(3.0, 0.0, 0.0) } else { Vec3::zeros() };
 ///             let _ = calibration.step(now, &ImuData { accel: measured, gyro, temperature: 25.0, ..Default::default() });
 ///         }
@@ -185,6 +185,7 @@ impl SixPosition {
     pub fn step(&mut self, now: Instant, imu: &ImuData) -> Result<Option<Face>, SixPositionRefusal> {
         match self.average.step(now, imu) {
             Err(reason) => {
+                // Only motion allows the next hold: otherwise one position would be counted twice.
                 self.taken &= reason == NotStill::NotFinite;
                 Err(SixPositionRefusal::Moving(reason))
             }

@@ -29,7 +29,7 @@ pub struct StillQuality {
 /// use stampfly_types::{Instant, Vec3, messages::ImuData};
 /// let mut calibration = StillCalibration::default();
 /// for k in 0..1500 {
-/// // A sensor has noise. One that repeats a value is faulty, and the calibration never completes.
+///     // A sensor has noise. With one that repeats a value the calibration never completes.
 ///     let noise = Vec3::repeat(if k % 2 == 0 { 1e-3 } else { -1e-3 });
 ///     let accel = Vec3::new(0.0, 0.0, -9.81) + noise;
 ///     let still = ImuData { accel, gyro: Vec3::new(0.01, 0.0, 0.0) + noise, temperature: 25.0, ..Default::default() };
@@ -79,6 +79,7 @@ impl StillCalibration {
             step = Err(NotStill::Frozen);
         }
         self.result.progress = self.average.progress();
+        // Count only interruptions of a collection, not every moving sample.
         if step.is_err() && begun && self.result.progress == 0.0 {
             self.result.restarts = self.result.restarts.wrapping_add(1);
         }

@@ -178,6 +178,8 @@ impl TemperatureTable {
         if !(0.0..BINS as f32).contains(&place) {
             return Err(out_of_range);
         }
+        // After a motion, the known bias at this temperature gives the new anchor; an unknown one
+        // would mix attitude and bias.
         let anchor = match (self.anchor, self.bias(temperature)) {
             (Some(anchor), _) => anchor,
             (None, None) => mean.accel,

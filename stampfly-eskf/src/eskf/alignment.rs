@@ -102,7 +102,10 @@ impl Alignment {
         if time > GAP {
             return Step::Window;
         }
+        // Changes since the start of the window, at which the estimated velocity was set to the
+        // measured one.
         let [p, w] = [[felt[0] - first[0], felt[1] - first[1]], [measured[0] - first[0], measured[1] - first[1]]];
+        // Halve all sums: the means and the fit stay, their weight decreases.
         if self.windows >= MEMORY {
             let sums = [&mut self.felt, &mut self.measured, &mut self.products, &mut self.squares];
             sums.into_iter().flatten().for_each(|sum| *sum *= 0.5);

@@ -120,6 +120,8 @@ impl Eskf {
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
                 self.aided(&axes.given);
+                // Apply the jump to the present state: the change since the measurement is known
+                // from the inertial sensor.
                 self.state.velocity += Vec3::from(axes.measured) - delayed.state.velocity;
                 for axis in 0..3 {
                     if axes.given[axis] {
@@ -140,6 +142,7 @@ impl Eskf {
         if axes.are_beyond(FARTHEST[POSITION]) {
             return Err(Refusal::Implausible);
         }
+        // The first fix of an axis defines its position; a gate could not test it.
         let first = core::array::from_fn::<_, 3, _>(|axis| axes.given[axis] && self.is_nowhere(axis));
         if !self.is_north_known() || first.contains(&true) {
             // Without a heading the inertial sensor cannot propagate the position from fix to fix:
@@ -250,6 +253,7 @@ impl Eskf {
             Step::Window => self.follow(delayed, axes),
             Step::Found { turn, sigma } => {
                 self.turn_to_north(turn, sigma);
+                // The rotation of the world frame has changed the delayed state, too.
                 let Some(delayed) = &self.state_at(delayed.age) else { return };
                 self.follow(delayed, axes);
             }
@@ -283,6 +287,7 @@ impl Eskf {
             GateResult::Fuse => Ok(self.update(&innovation, ratio)),
             GateResult::Reject => Ok(Fusion::Gated { ratio }),
             GateResult::Reset => {
+                // Carry the measured attitude to the present by the rotation since then.
                 self.state.attitude = multiply([w, x, y, z], delayed.step.delta_rotation);
                 self.reset_history();
                 for axis in 0..3 {
@@ -329,10 +334,10 @@ impl Eskf {
     ///     if k % 10 != 0 {
     ///         continue;
     ///     }
-    /// // A wheel, m/s: the velocity along body x, and no sideways slip along y.
+    ///     // A wheel, m/s: the velocity along body x, and no sideways slip along y.
     ///     let speed = |state: &NominalState| { let [x, y, _] = velocity::body(state); [x, y] };
     ///     assert!(eskf.fuse(at, speed, [0.0, 0.0], [0.04, 0.01], 5.0).is_fused());
-    /// // A range to a beacon, m, a fifth of a second late.
+    ///     // A range to a beacon, m, a fifth of a second late.
     ///     let range = |state: &NominalState| {
     ///         let away = state.position - beacon;
     ///         let distance = away.norm().max(0.1);

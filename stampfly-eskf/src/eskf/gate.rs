@@ -117,6 +117,7 @@ impl Gates {
         }
         let since = *record.gated_since.get_or_insert(now);
         record.gated = record.gated.saturating_add(1);
+        // Both conditions: a fast sensor reaches the number at once, a slow one the time.
         let locked_out = now.since(since).seconds() > lockout && record.gated >= samples;
         if locked_out { GateResult::Reset } else { GateResult::Reject }
     }

@@ -48,6 +48,7 @@ impl Estimator for Eskf {
     fn command(&mut self, at: Instant, command: &EstimatorCommand) {
         let previous = core::mem::replace(&mut self.command, *command);
         if command.full_resets != previous.full_resets && self.initialized {
+            // In flight, attitude and biases are better than those of the calibration.
             if command.on_ground || self.anchor.is_some() {
                 let calibration = self.calibration;
                 self.initialize(at, &calibration);
@@ -114,6 +115,7 @@ impl Estimator for Eskf {
         }
         let imu = &imu;
         self.now = at;
+        // The motion during a gap is unknown, so late measurements cannot be placed before it.
         if dt > MAX_STEP {
             self.reset_history();
         }
@@ -126,6 +128,7 @@ impl Estimator for Eskf {
         let due = self.pending_step.duration > COVARIANCE_STEP;
         if due {
             let [force, rate] = &self.vibration;
+            // Mean square times the sample interval is a noise density.
             let [force, rate] = [force.mean_square() * motion.dt, rate.mean_square() * motion.dt];
             let unfelt = if self.command.accel_faulty { UNFELT_NOISE * UNFELT_NOISE } else { 0.0 };
             let noise = ProcessNoise {
@@ -320,6 +323,7 @@ impl Eskf {
         let (sin, cos) = math::sin_cos(0.5 * heading);
         self.state.attitude = multiply([cos, 0.0, 0.0, sin], self.state.attitude);
         self.pending_rotation = self.state.rotation();
+        // The variance of a rotation about the vertical, distributed over the body axes.
         for (axis, part) in self.pending_rotation[2].into_iter().enumerate() {
             self.covariance.inflate(ATTITUDE + axis, part * part * sigma * sigma);
         }

@@ -69,6 +69,7 @@ impl Eskf {
         if self.anchor.is_none() && self.range_gate.is_window(tof.distance, expected) {
             return Err(Refusal::Range);
         }
+        // Counted before the gate: a monitor looks at every range that was comparable.
         if let Some(tested) = self.status.tested.get_mut(Counter::Tof as usize) {
             *tested = tested.wrapping_add(1);
         }
@@ -86,6 +87,7 @@ impl Eskf {
             return Err(Refusal::Implausible);
         }
         self.range_used = self.now;
+        // The first range in flight defines the surface instead of correcting the height.
         let surface = *self.surface.get_or_insert(delayed.state.position.z + below);
         let row = aid::tof::range(&delayed.state, &delayed.rotation, surface);
         // The beam is a cone and reports the nearest surface in it: on a tilted body anything
@@ -109,6 +111,7 @@ impl Eskf {
                     return Ok(self.finish_reset(Sensor::Tof));
                 }
                 self.state.position.z += down;
+                // Twice the standard deviation, because the height rests on this single sample.
                 self.covariance.reset(POSITION + 2, 4.0 * variance);
                 // The height error came from a climb-rate error, and that from an acceleration
                 // error during the lock-out. Open both, so that the next ranges estimate them.
@@ -151,6 +154,7 @@ impl Eskf {
         if self.covariance.get(POSITION + 2, POSITION + 2) > uncertain * uncertain {
             return Err(Refusal::Missing);
         }
+        // The interval ends half its length after its middle.
         let end = delayed.age - 0.5 * flow.interval;
         let turning = self.history.mean_rate(end, flow.interval).unwrap_or(self.rate);
         let raw = turning + self.state.gyro_bias;

@@ -7,9 +7,10 @@
 //! - **Turn too fast for flow**: inflates the tilt.
 //! - **Finding of a monitor** ([`correct`](crate::Estimator::correct)): corrects attitude, velocity
 //!   and biases.
-//! - **[`check_health`](Eskf::check_health)**: a state that is not finite, an unsound covariance,
-//!   or motion beyond any flight. Restarts position and velocity, on the ground everything, and
-//!   reports divergence.
+//! - **[`check_health`](Eskf::check_health)**: a state that is not finite or an unsound covariance
+//!   restarts position and velocity, on the ground everything, and reports divergence. A position
+//!   or velocity beyond any flight only reports divergence; the caller may then command a full
+//!   reset.
 
 use super::*;
 
@@ -77,6 +78,7 @@ impl Eskf {
         if !self.initialized || !numbers.into_iter().all(f32::is_finite) || !down.is_finite() {
             return;
         }
+        // The turn is a rotation vector in the world, so it multiplies from the left.
         let (sin, cos) = math::sin_cos(0.5 * turn.norm());
         let axis = turn * (sin / math::larger(turn.norm(), f32::MIN_POSITIVE));
         self.state.attitude = multiply([cos, axis.x, axis.y, axis.z], self.state.attitude);
@@ -117,6 +119,7 @@ impl Eskf {
         self.pending_step = PropagationStep::default();
         self.pending_rotation = self.state.rotation();
         let vertical = self.pending_rotation[2];
+        // The heading's variance about the vertical, and a tilt variance on all axes.
         for (axis, part) in vertical.iter().enumerate() {
             self.covariance.inflate(ATTITUDE + axis, part * part * sigma * sigma + ALIGNED_TILT * ALIGNED_TILT);
         }

@@ -44,6 +44,7 @@ impl Wander {
         if follows {
             self.differences = (self.differences + 1.0).min(FIXES);
             for ((white, residual), innovation) in self.white.iter_mut().zip(self.residual).zip(innovations) {
+                // The motion since the last fix cancels: both values are relative to the estimate.
                 let difference = innovation - residual;
                 *white += (0.5 * difference * difference - *white) / self.differences;
             }

@@ -60,8 +60,8 @@ const fn place(state: usize) -> (usize, usize) {
 }
 
 impl Covariance {
-    /// A diagonal matrix from one standard deviation per block: position, velocity, attitude, gyro bias,
-    /// accelerometer bias.
+    /// A diagonal matrix from one standard deviation per block: position, velocity, attitude, gyro
+    /// bias, accelerometer bias.
     #[inline]
     #[must_use]
     pub fn from_sigmas(sigmas: [f32; 5]) -> Self {
@@ -123,6 +123,7 @@ impl Covariance {
     #[inline(never)]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
+        // Any NaN or infinity makes the sum not finite.
         let sum: f32 = self.rows.iter().flatten().flatten().flat_map(|lanes| lanes.to_array()).sum();
         sum.is_finite() && self.variances().all(|variance| variance >= 0.0)
     }

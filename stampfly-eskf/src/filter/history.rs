@@ -143,6 +143,7 @@ impl History {
             newest.length = length;
             return;
         }
+        // Normalised once per interval, against the drift of the running product.
         let turned = normalize(multiply(self.turned(), motion.delta_rotation));
         self.newest = if self.newest + 1 < DEPTH { self.newest + 1 } else { 0 };
         if let Some(place) = self.intervals.get_mut(self.newest) {
@@ -170,6 +171,7 @@ impl History {
                 step.prepend(interval.length, interval.delta_velocity);
                 continue;
             }
+            // The oldest interval is used in part, with constant rate and force.
             step.prepend(left, interval.delta_velocity * (left / interval.length));
             let to_end = multiply(conjugate(interval.turned), self.turned());
             step.delta_rotation = multiply(small_rotation(interval.rate * left), to_end);

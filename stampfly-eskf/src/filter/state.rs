@@ -66,6 +66,7 @@ impl NominalState {
         let half = small_rotation(turn);
         let delta_velocity = turn_by(multiply(self.attitude, half), &force) * dt;
         let gained = delta_velocity + Vec3::new(0.0, 0.0, GRAVITY * dt);
+        // With the mean velocity of the step.
         self.position += (self.velocity + gained * 0.5) * dt;
         self.velocity += gained;
         let delta_rotation = twice(half);
@@ -109,6 +110,7 @@ impl NominalState {
     /// Whether every number is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
+        // Any NaN or infinity makes the sum not finite.
         let sum = self.position.sum() + self.velocity.sum() + self.gyro_bias.sum() + self.accel_bias.sum();
         (sum + self.attitude.iter().sum::<f32>()).is_finite()
     }

@@ -1,4 +1,4 @@
-//! Whom the airspeed believes: a pitot tube is doubted when the velocity contradicts it, and trusted again only when it agrees.
+//! `Air`: rejection of a faulty pitot tube by the velocity, and acceptance once it agrees again.
 
 use stampfly_eskf::{Air, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{
@@ -7,7 +7,7 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, Instant, Stamped, Vec3};
 
-/// An estimator that knows what a test tells it.
+/// An estimator whose estimate the test sets.
 struct Told(StateEstimate);
 
 const NOT_USED: Fusion = Fusion::Refused(Refusal::NotUsed);
@@ -67,7 +67,8 @@ impl Flight {
         self.estimator.0.sensors = SensorMask::NONE.set(SensorMask::EXTERNAL, known);
     }
 
-    /// For so long, s, with a tube that shows this speed, m/s, or nothing. Is the tube believed then, and which airspeed is it?
+    /// Flies `seconds` with a tube that shows this speed, m/s, or is silent. Returns whether the
+    /// tube is accepted at the end, and the airspeed.
     fn goes_on(&mut self, seconds: f32, tube: Option<f32>) -> (bool, f32) {
         for _ in 0..(seconds * 100.0) as u32 {
             self.now += Duration::from_millis(10);
@@ -90,7 +91,8 @@ fn a_tube_that_shows_nothing_is_doubted_after_a_second() {
     assert_eq!(flight.goes_on(0.6, Some(0.0)), (false, 15.0), "velocity less wind");
 }
 
-/// A blocked tube was believed again ten seconds after the last fix, because nothing contradicted it any more: the aircraft flew into the ground.
+/// Regression: a blocked tube was accepted ten seconds after the last fix, because no reference
+/// contradicted it any more.
 #[test]
 fn a_doubted_tube_is_not_believed_because_nothing_contradicts_it() {
     let mut flight = Flight::new();
@@ -101,7 +103,7 @@ fn a_doubted_tube_is_not_believed_because_nothing_contradicts_it() {
     assert_eq!(flight.goes_on(60.0, Some(0.0)), (false, 15.0));
 }
 
-/// Without fixes the velocity drifts away from a tube that is right.
+/// Without fixes the velocity drifts away from a correct tube.
 #[test]
 fn a_velocity_that_nobody_corrects_does_not_judge() {
     let mut flight = Flight::new();

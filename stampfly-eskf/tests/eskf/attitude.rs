@@ -1,4 +1,5 @@
-//! The attitude filters from outside: any input, known motions, bent fields, hard iron, biases.
+//! Attitude filters through their interface: arbitrary input, known motion, distorted fields, hard
+//! iron, biases.
 
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -15,7 +16,7 @@ const DT: f32 = 0.005;
 /// The earth's field in central Europe, NED.
 const EARTH: Vec3 = Vec3::new(16.0, 0.0, 42.0);
 
-/// A body turned by a hand: all axes, back and forth, up to two radians a second.
+/// A body moved by a hand: all axes, back and forth, up to 2 rad/s.
 struct Hand {
     attitude: Quat,
     time: f32,
@@ -31,7 +32,7 @@ impl Hand {
         Vec3::from_fn(|_| sigma * self.noise.sample::<f32, _>(StandardNormal))
     }
 
-    /// Moves for a step (or rests) and shows rate and specific force.
+    /// Moves for a step, or rests, and returns rate and specific force.
     fn step(&mut self, moving: bool) -> (Vec3, Vec3) {
         self.time += DT;
         let t = self.time;
@@ -57,7 +58,7 @@ impl Hand {
     }
 }
 
-/// Still, level, heading north, as the hand begins.
+/// At rest, level, heading north, as the motion starts.
 fn calibration() -> CalibrationResult {
     let specific_force = Vec3::new(0.0, 0.0, -GRAVITY);
     CalibrationResult { specific_force, field: EARTH, complete: true, ..Default::default() }
@@ -67,8 +68,8 @@ fn started() -> AttitudeFilter {
     AttitudeFilter::from_calibration(AttitudeConfig::default(), &calibration())
 }
 
-/// Steps the filter through seconds of motion with this field in the world, this in the body, this gyro bias.
-/// Gives the worst tilt and heading error of the last half, and how many fields were turned down.
+/// Runs the filter over `seconds` of motion with this world field, body field and gyro bias.
+/// Returns the worst tilt and heading error of the last half, and the number of rejected fields.
 fn carry(
     hand: &mut Hand,
     filter: &mut AttitudeFilter,
@@ -139,7 +140,7 @@ fn a_magnet_nearby_turns_nothing_and_is_reported() {
 
 #[test]
 fn a_field_that_only_turns_is_not_followed_at_once() {
-    // Strength and dip as before: only the suddenness gives it away.
+    // Strength and dip as before: only the sudden change reveals it.
     let (mut hand, mut filter) = (Hand::new(), started());
     carry(&mut hand, &mut filter, 30.0, true, EARTH, Vec3::zeros(), Vec3::zeros());
     let turned = Quat::from_euler_angles(0.0, 0.0, 0.5) * EARTH;
@@ -151,7 +152,8 @@ fn a_field_that_only_turns_is_not_followed_at_once() {
 fn another_place_is_told_from_drift_and_home_is_found_again() {
     let (mut hand, mut filter) = (Hand::new(), started());
     carry(&mut hand, &mut filter, 20.0, true, EARTH, Vec3::zeros(), Vec3::zeros());
-    // Half as strong again and turned by 50°, for good: after a while it is the reference, without its direction.
+    // 1.5 times as strong and turned by 50°, permanently: it becomes the reference, without its
+    // direction.
     let elsewhere = Quat::from_euler_angles(0.0, 0.0, 0.9) * (EARTH * 1.5);
     let (errors, refused) = carry(&mut hand, &mut filter, 60.0, true, elsewhere, Vec3::zeros(), Vec3::zeros());
     assert!(errors[1] < 5.0, "{errors:?}");
@@ -179,7 +181,8 @@ fn without_magnets_no_hard_iron_is_found() {
 
 #[test]
 fn delays_of_the_sensors_are_made_up_for() {
-    // What the sensors show is 4 and 15 ms old; a table turns steadily enough for its angle to be known exactly.
+    // The sensors are 4 and 15 ms late. A turntable moves steadily enough for its angle to be known
+    // exactly.
     let config = AttitudeConfig { inertial_delay: 0.004, mag_delay: 0.015, ..Default::default() };
     let heading_error = |config| {
         let mut filter = AttitudeFilter::from_calibration(config, &calibration());
@@ -251,7 +254,7 @@ fn as_an_estimator_it_reports_validity_and_refusals() {
     assert_eq!((estimate.position, estimate.velocity), (Vec3::zeros(), Vec3::zeros()));
     assert!(filter.status().offered[3] == 800 && filter.status().refused[3] < 150, "{:?}", filter.status());
 
-    // Sent twice, too late, from the far future, not a number.
+    // Repeated, too late, far in the future, NaN.
     let stale = Fusion::Refused(Refusal::Stale);
     assert_eq!(filter.fuse_mag(at, &mag), Fusion::Refused(Refusal::Repeated));
     assert_eq!(filter.fuse_mag(at + Duration::from_secs(5), &mag), Fusion::Refused(Refusal::Future));
@@ -305,7 +308,7 @@ fn how_large_they_are() {
     assert!(size_of::<Mahony>() <= 20, "{} bytes", size_of::<Mahony>());
 }
 
-/// Any number that can arrive, the impossible ones more often than they would.
+/// Any number, invalid ones more often than in reality.
 fn number() -> impl Strategy<Value = f32> {
     prop_oneof![
         6 => -50.0f32..50.0,
@@ -318,7 +321,7 @@ fn any_vector() -> impl Strategy<Value = Vec3> {
     (number(), number(), number()).prop_map(|(x, y, z)| Vec3::new(x, y, z))
 }
 
-/// A bias as calibrations find it, or one that cannot be.
+/// A plausible bias or an impossible one.
 fn calibrated_bias() -> impl Strategy<Value = Vec3> {
     let axis = || prop_oneof![5 => -0.03f32..0.03, 1 => Just(f32::NAN), 1 => Just(f32::MAX), 1 => Just(-42.0)];
     (axis(), axis(), axis()).prop_map(|(x, y, z)| Vec3::new(x, y, z))
@@ -345,7 +348,7 @@ proptest! {
             prop_assert!(is_unit(&filter.attitude()), "{:?}", filter.attitude());
             prop_assert!(is_unit(&mahony.attitude()), "{:?}", mahony.attitude());
         }
-        // And what it did does not last: a minute of rest, and the tilt is right.
+        // The effect is not permanent: after a minute of rest the tilt is right.
         let still = Vec3::new(0.0, 0.0, -GRAVITY);
         for _ in 0..6_000 {
             filter.step(&still, &Vec3::zeros(), 0.01);
@@ -370,12 +373,12 @@ proptest! {
         }
     }
 
-    /// The same motion in a room that is turned, and in one without a field: the tilt is the same.
+    /// The same motion in a rotated room and without a field: the tilt is the same.
     #[test]
     fn tilt_owes_nothing_to_the_field(turn in -3.0f32..3.0, strength in 0.1f32..3.0) {
         let run = |field: Option<Vec3>| {
             let (mut hand, mut filter) = (Hand::new(), AttitudeFilter::new(AttitudeConfig {
-                // The one way by which a field reaches the tilt is the vertical bias it shows.
+                // The field reaches the tilt only through the vertical gyro bias.
                 mag_bias_sigma: 1e3, ..Default::default()
             }));
             for _ in 0..1_000 {
@@ -393,8 +396,9 @@ proptest! {
         prop_assert!(apart < 1e-4, "{apart}");
     }
 
-    /// Heading is only relative to the field: turn the room, and the heading turns with it. Not exactly: the field dips
-    /// steeply, so a tilt error turns its level part by almost three times as much, the other way in a turned room.
+    /// The heading is relative to the field: in a rotated room it rotates, too. Not exactly: the
+    /// field dips steeply, so a tilt error turns its horizontal part by almost three times as much,
+    /// in the opposite direction in a rotated room.
     #[test]
     fn heading_follows_the_room(turn in -3.0f32..3.0) {
         let run = |turn: f32| {
@@ -414,7 +418,7 @@ proptest! {
         prop_assert!(frame::tilt(&apart) < 0.01);
     }
 
-    /// A dropped sample here and there costs next to nothing: the step is as long as it was.
+    /// A dropped sample has hardly any effect, because the step is then longer.
     #[test]
     fn dropped_samples_are_bridged(seed in any::<u64>()) {
         let mut drops = ChaCha8Rng::seed_from_u64(seed);

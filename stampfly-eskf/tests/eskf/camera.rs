@@ -1,10 +1,10 @@
-//! Limits of a camera for optical flow: a floor that is too near, and one that passes too fast.
+//! Limits of an optical flow camera: a floor that is too near, and one that passes too fast.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{CalibrationResult, EstimateCorrection, EstimatorCommand, FlowData, ImuData, TofData};
 use stampfly_types::{GRAVITY, Instant, Vec3};
 
-/// A filter that has stood, and was then lifted to this height, m. Does it fly, or does a hand carry it?
+/// A filter that has stood and was then raised to this height, m; `flying`, or carried by a hand.
 fn aloft(height: f32, flying: bool) -> (Eskf, Instant) {
     let mut eskf = Eskf::new(EskfConfig::default());
     let specific_force = Vec3::new(0.0, 0.0, -GRAVITY);
@@ -16,7 +16,7 @@ fn aloft(height: f32, flying: bool) -> (Eskf, Instant) {
     let mut at = Instant::ZERO;
     for step in 1..=2_000u64 {
         at = Instant::from_micros(2_500 * step);
-        // What measures never repeats itself.
+        // A working sensor never repeats itself.
         let dither = 1e-3 * ((step * 7_919 % 101) as f32 / 50.0 - 1.0);
         eskf.predict(at, &ImuData { accel: specific_force, temperature: 25.0, ..ImuData::default() });
         if step == 800 {
@@ -31,7 +31,7 @@ fn aloft(height: f32, flying: bool) -> (Eskf, Instant) {
     (eskf, at)
 }
 
-/// A picture that moves by this rate about the body's y axis, rad/s.
+/// An image that moves at this rate about body y, rad/s.
 fn picture(rate: f32) -> FlowData {
     FlowData { delta_x: 0.01 * rate, delta_y: 1e-5, interval: 0.01, quality: 100, valid: true }
 }
@@ -72,7 +72,7 @@ fn a_picture_that_is_faster_than_the_camera_follows_is_not_used() {
         let (mut eskf, at) = aloft(0.3, true);
         let velocity = Vec3::new(speed, 0.0, 0.0);
         eskf.correct(at, &EstimateCorrection { velocity, velocity_sigma: 0.05, ..EstimateCorrection::default() });
-        // A correction empties the history: a reading that waits is compared with what comes after.
+        // A correction clears the history: a waiting reading is compared with later samples.
         let mut now = at;
         for step in 1..=20u64 {
             now = Instant::from_micros(at.as_micros() + 2_500 * step);
@@ -81,7 +81,7 @@ fn a_picture_that_is_faster_than_the_camera_follows_is_not_used() {
         }
         eskf.fuse_flow(now, &picture(rate))
     };
-    // 3 m/s over 0.3 m are 10 rad/s, which it shows as something else.
+    // 3 m/s at 0.3 m are 10 rad/s, which alias.
     assert_eq!(fusion(3.0, 6.9), Fusion::Refused(Refusal::Range));
     assert!(!matches!(fusion(1.5, 5.0), Fusion::Refused(_)), "5 rad/s are seen");
     assert!(!matches!(fusion(3.0, 0.5), Fusion::Refused(_)), "a contradiction is for the gate");

@@ -1,13 +1,13 @@
-//! Inertial samples that are numbers, and still no measurement.
+//! Samples that are finite but physically impossible.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{CalibrationResult, ImuData};
 use stampfly_types::{Instant, Vec3};
 
-/// What a level vehicle that stands measures, m/s².
+/// Specific force of a level vehicle at rest, m/s².
 const LEVEL: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 
-/// An estimator that begins level.
+/// An estimator that starts level.
 fn standing() -> Eskf {
     let mut eskf = Eskf::new(EskfConfig::default());
     eskf.initialize(Instant::ZERO, &CalibrationResult { specific_force: LEVEL, ..Default::default() });
@@ -41,7 +41,7 @@ fn a_turn_of_many_revolutions_in_one_step_leaves_an_attitude() {
     }
 }
 
-/// A model of one's own with a gate that lets all pass.
+/// A user's model with a gate that accepts everything.
 #[test]
 fn a_measurement_that_would_leave_no_attitude_is_refused() {
     use stampfly_eskf::aid::Row;
@@ -59,7 +59,7 @@ fn a_measurement_that_would_leave_no_attitude_is_refused() {
     }
 }
 
-/// Whose square is infinite.
+/// Its square is infinite.
 #[test]
 fn a_standard_deviation_beyond_any_says_nothing() {
     use stampfly_types::Quat;
@@ -78,7 +78,7 @@ fn a_standard_deviation_beyond_any_says_nothing() {
     assert!(eskf.estimate().position.norm() < 1.0, "{:?}", eskf.estimate());
 }
 
-/// Said by somebody who is otherwise believed: after the lock-out the filter would be reset to it.
+/// From an otherwise trusted source: after the lock-out the filter would be reset to it.
 #[test]
 fn a_place_or_speed_of_no_vehicle_is_refused_however_often_it_is_told() {
     use stampfly_eskf::{Fusion, Refusal};
@@ -97,7 +97,7 @@ fn a_place_or_speed_of_no_vehicle_is_refused_however_often_it_is_told() {
         let flow = FlowData { delta_x: 1e38, delta_y: 0.0, interval: 0.01, quality: 200, valid: true };
         assert_eq!(eskf.fuse_flow(at, &flow), Fusion::Refused(Refusal::Range));
     }
-    // What is not measured may be anything.
+    // An axis that is not measured may have any value.
     let down = Vec3::new(0.1, -0.1, 1e30);
     let at = Instant::from_millis(5_005);
     eskf.predict(at, &ImuData { accel: LEVEL, ..Default::default() });

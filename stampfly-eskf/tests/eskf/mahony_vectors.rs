@@ -5,7 +5,8 @@ use stampfly_eskf::attitude::Mahony;
 use stampfly_types::{Quat, Vec3, frame};
 use std::f64::consts::PI;
 
-/// Largest difference of a quaternion's components, and of an angle in radians. Single precision alone makes 1e-5.
+/// Largest difference of a quaternion's components, and of an angle in radians. Single precision
+/// alone accounts for 1e-5.
 const CLOSE: f64 = 3e-5;
 
 fn vectors() -> Value {
@@ -39,7 +40,7 @@ fn assert_close(attitude: &Quat, sample: &Value, what: &str) {
     }
 }
 
-/// The motion of a case at a time: rate and specific force, as the file words them.
+/// Motion of a case at a time: rate and specific force, as defined in the file.
 fn motion(case: &Value, time: f64) -> (Vec3, Vec3) {
     let gyro = match case["gyro_fn"].as_str() {
         Some("(0.5 sin(2pi 0.5 t), 0.3 cos(2pi 0.3 t), 0.2) rad/s") => {
@@ -97,7 +98,7 @@ fn every_single_step() {
     }
 }
 
-/// Gravity with the signs as they were printed would end upside down; this filter does not.
+/// With the published signs of gravity the filter would settle upside down.
 #[test]
 fn not_as_it_was_printed() {
     let vectors = vectors();
@@ -109,6 +110,6 @@ fn not_as_it_was_printed() {
         filter.step(&Vec3::new(0.0, -0.5, -0.866_025_4), &Vec3::zeros(), 0.000_25);
     }
     let roll = frame::roll_pitch_yaw(&filter.attitude())[0].to_degrees();
-    // Steps of 0.25 ms are too small for single precision to go the last hundredth of a degree.
+    // Steps of 0.25 ms are too small for single precision to reach the last hundredth of a degree.
     assert!((roll - 30.0).abs() < 0.03, "{roll}°");
 }

@@ -1,5 +1,5 @@
-//! Estimators, attitude filters and calibrations. One binary, because each would link the estimators again:
-//! `cargo test -p stampfly-eskf --test eskf consistency` runs one file.
+//! Tests of estimators, attitude filters and calibrations in one binary, because each binary would
+//! link the estimators again. `cargo test -p stampfly-eskf --test eskf consistency` runs one module.
 
 mod air;
 mod attitude;

@@ -1,5 +1,5 @@
-//! Boats, planes and rovers may never turn as fast as a hand does: a field that stays the same while they turn slowly is the
-//! reference all the same.
+//! Boats, planes and rovers never turn as fast as a hand: a field that stays constant while they
+//! turn slowly must become the reference, too.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,15 +16,15 @@ fn heading_error(filter: &AttitudeFilter, heading: f32) -> f32 {
     math::wrap_angle(math::atan2(forward.y, forward.x) - heading)
 }
 
-/// Ten minutes of turning left and right by at most `rate`, rad/s, with a biased gyro: what is left of the bias about the
-/// vertical, rad/s, the heading's deviation and its error, rad.
+/// Ten minutes of turning left and right by at most `rate`, rad/s, with a biased gyro. Returns the
+/// remaining vertical bias, rad/s, the heading's standard deviation and its error, rad.
 fn sailed(rate: f32, field: impl Fn(f32) -> Vec3) -> [f32; 3] {
     let [bias, sigma, error, ..] = swung(rate, 0.3, 0.0, field);
     [bias, sigma, error]
 }
 
-/// The same, back and forth at this frequency, rad/s, with so much of a small sensor's noise; then also the largest error in the last
-/// five minutes, rad, and in deviations.
+/// The same at this frequency, rad/s, with `noise` times the noise of a small sensor. Returns also
+/// the largest error in the last five minutes, rad, and in standard deviations.
 fn swung(rate: f32, frequency: f32, noise: f32, field: impl Fn(f32) -> Vec3) -> [f32; 5] {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut noisy = |value: Vec3, sigma: f32| {
@@ -69,7 +69,7 @@ fn a_body_that_turns_slowly_finds_its_vertical_bias() {
 
 #[test]
 fn a_field_that_changes_while_it_turns_slowly_is_no_reference() {
-    // Every three seconds it passes another hull.
+    // It passes another hull every three seconds.
     let bent = |time: f32| EARTH * (1.0 + 0.15 * math::sin(time * 2.1));
     let [_, sigma, _] = sailed(17f32.to_radians(), bent);
     assert!(sigma.to_degrees() > 2.0, "{} degrees", sigma.to_degrees());
@@ -77,7 +77,8 @@ fn a_field_that_changes_while_it_turns_slowly_is_no_reference() {
 
 #[test]
 fn turning_points_are_no_rest() {
-    // Slower than a bias may be for a part of the time, or all of it: gyro and accelerometer see a body at rest.
+    // Slower than the largest bias, for a part of the time or all of it: to gyro and accelerometer
+    // the body is at rest.
     for (frequency, noise) in [1.0f32, 0.3, 0.1, 0.03].into_iter().flat_map(|f| [(f, 0.0), (f, 1.0)]) {
         for degrees in [10.0f32, 7.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5] {
             let [_, sigma, _, worst, deviations] = swung(degrees.to_radians(), frequency, noise, |_| EARTH);
@@ -101,7 +102,7 @@ fn a_magnet_that_passes_a_body_at_rest_does_not_end_what_the_rest_has_shown() {
     for step in 0..12_000u16 {
         let time = DT * f32::from(step);
         filter.step(&Vec3::new(0.0, 0.0, -GRAVITY), &Vec3::new(0.0, 0.0, 0.01), DT);
-        // Turned by 20 degrees, neither stronger nor steeper, for five seconds.
+        // Rotated by 20 degrees at the same strength and dip, for five seconds.
         let (sin, cos) = if (60.0..65.0).contains(&time) { math::sin_cos(0.35) } else { (0.0, 1.0) };
         _ = filter.field(&Vec3::new(cos * EARTH.x, sin * EARTH.x, EARTH.z), 0.0, DT);
         if time > 30.0 {

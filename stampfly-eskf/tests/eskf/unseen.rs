@@ -1,4 +1,4 @@
-//! What the filter does with what it cannot see, or sees late: cases that recorded data brought up.
+//! Motion that sensors do not see, or see late: cases from recorded data.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
 use stampfly_types::messages::{CalibrationResult, EstimatorCommand, FlowData, ImuData, MagData, TofData, Validity};
@@ -16,12 +16,12 @@ fn started(config: EskfConfig) -> Eskf {
     eskf
 }
 
-/// Gravity in a body of this attitude.
+/// Specific force at rest in this attitude.
 fn force(attitude: &Quat) -> Vec3 {
     attitude.inverse() * Vec3::new(0.0, 0.0, -GRAVITY)
 }
 
-/// A sensor that measures never repeats itself: ±1 by the instant.
+/// A working sensor never repeats itself: ±1, by the instant.
 fn dither(at: Instant) -> f32 {
     (at.as_micros() / 2_500 * 7_919 % 101) as f32 / 50.0 - 1.0
 }
@@ -50,7 +50,7 @@ fn without_any_aid_a_biased_accelerometer_is_not_integrated_for_ever() {
 
 #[test]
 fn a_height_that_nothing_measures_is_no_divergence_and_one_that_something_measured_is() {
-    // Motors shake the vertical zero away.
+    // Motors shift the accelerometer's vertical zero.
     let run = |ranges: u64, flying: bool| {
         let mut eskf = started(EskfConfig::indoors());
         eskf.command(Instant::ZERO, &EstimatorCommand { flying, ..EstimatorCommand::default() });
@@ -88,7 +88,7 @@ fn tilted_out_of_sight_the_velocity_fades() {
     };
     fly(&mut eskf, 2.0, Quat::identity(), Vec3::zeros());
     assert!((eskf.estimate().velocity.x - 0.3).abs() < 0.02, "{:?}", eskf.estimate().velocity);
-    // Rolled by 60° within a fifth of a second, gravity turning with it.
+    // Rolled by 60° within a fifth of a second; gravity rotates with it.
     for tenth in 1..=10u8 {
         let roll = f32::from(tenth) * 0.1 * 1.05;
         fly(&mut eskf, 0.02, Quat::from_euler_angles(roll, 0.0, 0.0), Vec3::new(5.25, 0.0, 0.0));
@@ -101,7 +101,7 @@ fn tilted_out_of_sight_the_velocity_fades() {
 
 #[test]
 fn rotation_is_taken_out_of_late_flow_at_the_time_it_was_seen() {
-    // Rolling to and fro on the spot, ±3 rad/s twice a second, with flow that is 15 ms late.
+    // Rolling back and forth on the spot, ±3 rad/s twice a second, with flow that is 15 ms late.
     let speed_of = |delay: f32| {
         let mut eskf = started(EskfConfig { flow_delay: delay, ..EskfConfig::default() });
         let rate = |time: f32| if time > 0.5 { 3.0 * math::sin(4.0 * math::PI * (time - 0.5)) } else { 0.0 };

@@ -1,5 +1,5 @@
-//! The vertical axis of a take-off, and of a flight without a range: what propellers do to a barometer and an accelerometer is no
-//! motion.
+//! The vertical axis in a take-off and in flight without a range: the effect of propellers on
+//! barometer and accelerometer is not motion.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, EstimatorCommand, FlowData, ImuData, TofData};
@@ -8,22 +8,22 @@ use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3};
 /// Time between inertial samples.
 const STEP: Duration = Duration::from_micros(2_500);
 
-/// A filter that has stood for two seconds, and what its sensors say.
+/// A filter that has stood for two seconds, and its sensors.
 struct Rig {
     eskf: Eskf,
     at: Instant,
     steps: u32,
     attitude: Quat,
-    /// How far the vehicle is above the floor that it stood on, m, and the error of the barometer, m.
+    /// Height above the floor, m, and error of the barometer, m.
     height: f32,
     pressure: f32,
-    /// What its range says of a vehicle that stands, m.
+    /// Range on the ground, m.
     clearance: f32,
-    /// Error of the accelerometer's zero upwards, m/s².
+    /// Upward error of the accelerometer's zero, m/s².
     zero: f32,
-    /// Is there a range?
+    /// Whether there is a range.
     range: bool,
-    /// Flow's motion of the picture about the body's y axis, rad/s.
+    /// Image rate about body y, rad/s.
     slips: Option<f32>,
 }
 
@@ -68,7 +68,7 @@ impl Rig {
         self.at += STEP;
         self.steps += 1;
         let at = self.at;
-        // What measures never repeats itself.
+        // A working sensor never repeats itself.
         let dither = (self.steps * 7_919 % 101) as f32 / 50.0 - 1.0;
         let accel = self.attitude.inverse() * Vec3::new(0.0, 0.0, -GRAVITY - self.zero + 0.02 * dither);
         self.eskf.predict(at, &ImuData { accel, temperature: 25.0, ..ImuData::default() });
@@ -97,13 +97,13 @@ fn the_pressure_of_starting_propellers_is_no_motion() {
     let mut rig = Rig::standing(EskfConfig::default());
     rig.range = false;
     rig.leave_the_ground();
-    // StampFlys read 0.6 m lower near the floor.
+    // A StampFly reads 0.6 m lower near the floor.
     rig.pressure = -0.6;
     for _ in 0..20 {
         rig.fly(0.05);
         assert!(rig.climb().abs() < 0.05, "{} m/s", rig.climb());
     }
-    // And 0.2 m above it: the vehicle is still there.
+    // And 0.2 m lower above it; the vehicle has not moved.
     for _ in 0..20 {
         rig.pressure += 0.02;
         rig.fly(0.05);

@@ -20,7 +20,8 @@ const UNCLEAR: f32 = 0.3;
 /// courses diverge later; and where it would be a second shift within seconds.
 const PERHAPS_GYRO: f32 = 0.8;
 
-/// See the module documentation.
+/// Tests whether flow velocity deviates from dead reckoning, and a gyro shift does not explain it.
+/// Details are at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowDisagrees {

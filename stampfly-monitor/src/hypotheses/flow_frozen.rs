@@ -6,7 +6,8 @@ use crate::evidence::Evidence;
 use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::messages::Finding;
 
-/// See the module documentation.
+/// Tests whether the camera repeats one reading that is not zero. Details are at the head of the
+/// file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowFrozen {

@@ -22,7 +22,8 @@ const SPAN: f32 = 0.15;
 /// and a jump of the gyro's zero, which looks the same, has been found and corrected.
 const WAITS: f32 = 0.1;
 
-/// See the module documentation.
+/// Tests whether the flow velocity jumps without a measured acceleration. Details are at the head
+/// of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowJumped {

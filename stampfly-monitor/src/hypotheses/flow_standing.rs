@@ -8,7 +8,8 @@ use stampfly_types::messages::Finding;
 /// Rate above which the vehicle counts as carried, rad/s.
 const TURNS: f32 = 0.5;
 
-/// See the module documentation.
+/// Tests whether the camera shows motion while the vehicle stands. Details are at the head of the
+/// file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStanding {

@@ -10,7 +10,8 @@ use crate::hypothesis::{Hypothesis, Opinion, Sensor};
 use stampfly_types::math;
 use stampfly_types::messages::Finding;
 
-/// See the module documentation.
+/// Tests whether the camera shows no motion while the body turns. Details are at the head of the
+/// file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowStill {
@@ -40,6 +41,8 @@ impl Hypothesis for FlowStill {
         if self.zeros < config.flow_zeros {
             return Opinion::Unknown;
         }
+        // Both: enough rotation for the camera to resolve, and more than the vehicle may move
+        // unnoticed.
         if self.turned > config.flow_turn_rad && self.turned * flow.distance > config.flow_motion_m {
             Opinion::Holds(seen.back_to_before(self.zeros as f32 * flow.interval))
         } else {

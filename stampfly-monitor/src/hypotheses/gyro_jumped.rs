@@ -70,7 +70,8 @@ struct Found {
     velocity: Vec3,
 }
 
-/// See the module documentation.
+/// Tests whether the gyro's zero jumps between two samples, by the image of the floor. Details are
+/// at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroJumped {
@@ -141,6 +142,7 @@ impl GyroJumped {
         if squared(before) + squared(after) > FLAT * FLAT * size || ramp > RAMP * size {
             return None;
         }
+        // The middle between the second and the third newest sample at 400 Hz.
         let since = *at - Duration::from_micros(3_750);
         let is_low = self.low.is_some_and(|low| at.since(low) < LOW);
         if is_low && self.blow < FELT * FELT * size {
@@ -177,6 +179,7 @@ impl GyroJumped {
         let body = seen.estimate.attitude.inverse_transform_vector(&grown.horizontal());
         let excess = [flow.rate[1] + body.y / flow.distance, -flow.rate[0] - body.x / flow.distance];
         let from = seen.now - LATE - Duration::from_seconds(flow.interval);
+        // Its frames were taken before the jump.
         if from < examination.since {
             return None;
         }

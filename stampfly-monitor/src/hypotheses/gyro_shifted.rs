@@ -19,7 +19,8 @@ const LATELY: Duration = Duration::from_secs(6);
 /// Uncertain share of a shift after the fit.
 const UNCERTAIN: f32 = 0.1;
 
-/// See the module documentation.
+/// Tests whether the camera velocity deviates from dead reckoning as a shifted gyro zero predicts.
+/// Details are at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroShifted {

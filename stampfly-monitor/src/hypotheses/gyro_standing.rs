@@ -36,7 +36,8 @@ struct Means {
     rate: Vec3,
 }
 
-/// See the module documentation.
+/// Tests whether the gyro turns on the ground while gravity does not. Details are at the head of
+/// the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroStanding {

@@ -24,7 +24,8 @@ const AGREES: f32 = 0.15;
 /// Number of repetitions from which a reading does not count as agreement.
 const REPEATED: u32 = 15;
 
-/// See the module documentation.
+/// Tests whether the range jumps and stays there without an edge below; also clears the range.
+/// Details are at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeJumped {
@@ -40,6 +41,7 @@ impl Hypothesis for RangeJumped {
 
     fn step(&mut self, _: &MonitorConfig, seen: &Evidence<'_>) -> Opinion {
         let Some(range) = seen.range.as_ref().filter(|_| !seen.stands) else { return Opinion::Unknown };
+        // Left out: test for agreement only, which clears the finding.
         if !seen.trusts_range {
             let agrees = (range.distance - range.expected).abs() < AGREES
                 && !range.jumps

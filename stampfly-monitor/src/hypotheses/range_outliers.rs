@@ -13,7 +13,7 @@ const FADES: f32 = 0.4;
 /// the series ends after three seconds without one.
 const MOVES: u32 = 3;
 
-/// See the module documentation.
+/// Tests whether many ranges jump independently. Details are at the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeOutliers {

@@ -22,7 +22,8 @@ const ALWAYS: u32 = 45;
 /// repeat a range 24 times on the ground.
 const FROM_GROUND: u32 = 90;
 
-/// See the module documentation.
+/// Tests whether the range repeats one value while the vehicle moves. Details are at the head of
+/// the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeStuck {

@@ -41,7 +41,8 @@ const SHORTEST: f32 = 0.005;
 /// pressure, after which the barometer is not used until the vehicle stands again.
 const STEP: f32 = 0.35;
 
-/// See the module documentation.
+/// Tests whether the vehicle has risen higher since it stood than the ranges show. Details are at
+/// the head of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeWrapped {
@@ -95,6 +96,7 @@ impl RangeWrapped {
     /// Takes the change of the upward velocity within `dt` seconds, bias included, and the
     /// estimated climb rate, m/s.
     fn felt(&mut self, change: f32, climb: f32, dt: f32) {
+        // A leaky integral: errors of the bias do not accumulate beyond `GAINS` seconds.
         self.gained += change - (self.bias + self.gained * (1.0 / GAINS)) * dt;
         self.believed = climb;
     }

@@ -1,59 +1,60 @@
-//! A vehicle that leans to and fro on a given course, its sensors, and an estimator with fixed gains.
+//! A vehicle that tilts back and forth on a given course, its sensors, and an estimator with fixed
+//! gains.
 
 use stampfly_monitor::{Monitor, MonitorConfig, MonitorInput};
 use stampfly_types::messages::*;
 use stampfly_types::{GRAVITY, Instant, Quat, Stamped, Vec3, frame, math};
 
-/// It stands for so long at first, s.
+/// Time at rest at the start, s.
 const STOOD: f32 = 1.0;
-/// Height at which it stands, m.
+/// Height at rest, m.
 const GROUND: f32 = 0.03;
-/// Time constant with which it begins to lean, s.
+/// Time constant with which it starts to tilt, s.
 const SPOOLS: f32 = 0.5;
-/// Inertial samples come so often, s.
+/// Interval of inertial samples, s.
 pub const DT: f32 = 0.0025;
 
-/// A vehicle, and how it flies.
+/// A vehicle and its flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Vehicle {
-    /// Height in which it stays, m.
+    /// Height of the flight, m.
     pub height: f32,
-    /// In which time it takes off to there, s.
+    /// Duration of the take-off, s.
     pub climbs: f32,
-    /// How far it leans, rad, and how fast to and fro, rad/s.
+    /// Amplitude of the tilt, rad, and its frequency, rad/s.
     pub lean: f32,
     pub swing: f32,
-    /// Standard deviations of what propellers shake: m/s² and rad/s.
+    /// Standard deviations of the vibration: m/s² and rad/s.
     pub shakes: [f32; 2],
 }
 
-/// One of a palm's size that flies by hand in a room, and one of 2 kg above a field.
+/// A palm-sized vehicle in a room, and one of 2 kg above a field.
 pub const VEHICLES: [Vehicle; 2] = [
     Vehicle { height: 0.6, climbs: 1.5, lean: 0.12, swing: 2.5, shakes: [2.0, 0.04] },
     Vehicle { height: 4.0, climbs: 4.0, lean: 0.2, swing: 1.2, shakes: [1.0, 0.03] },
 ];
 
-/// What its sensors read. The body's own values go in; a fault changes them.
+/// Readings of the sensors. A fault changes the true values.
 pub struct Readings {
     pub time: f32,
     pub imu: ImuData,
-    /// Rate of the picture about body x and y, rad/s, before it is counted.
+    /// Image rate about body x and y, rad/s, before quantisation.
     pub picture: [f32; 2],
     pub range: f32,
     pub altitude: f32,
 }
 
-/// Gains of an estimator for each metre per second by which the camera differs: velocity, tilt, gyro
-/// bias; and for each metre of a range: height, climb rate.
+/// Gains of the estimator per m/s of camera residual: velocity, tilt, gyro bias; and per metre of
+/// range residual: height, climb rate.
 const LOW: f32 = 0.5;
 const GAINS: [f32; 3] = [0.08, 0.012, 0.004];
 const RANGE_GAINS: [f32; 2] = [0.4, 2.0];
-/// A range that is farther from what is expected is rejected, m.
+/// Residual above which a range is rejected, m.
 const GATE: f32 = 0.05;
-/// A nearer range is not compared in the air, m.
+/// Range below which it is not compared in flight, m.
 const WINDOW: f32 = 0.04;
 
-/// A flight until something is found or it ends.
+/// A flight until a finding or its end.
 pub struct Flight {
     pub monitor: Monitor,
     pub estimate: StateEstimate,
@@ -64,12 +65,12 @@ pub struct Flight {
     counted: [f32; 2],
     turned: [f32; 2],
     vehicle: Vehicle,
-    /// The last correction, and how many there were.
+    /// The last correction, and their number.
     pub correction: EstimateCorrection,
     pub corrections: u32,
 }
 
-/// Where the body is.
+/// State of the body.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Truth {
     pub attitude: Quat,
@@ -106,8 +107,7 @@ impl Flight {
         flight
     }
 
-    /// Flies for so many seconds, or until a sensor has a finding. What was found, and how many seconds
-    /// after the beginning.
+    /// Flies `seconds` or until a finding. Returns the findings and the time since the start, s.
     pub fn until_found(&mut self, seconds: f32, fault: impl FnMut(&mut Readings)) -> Option<(SensorFindings, f32)> {
         let before = self.step;
         self.fly(seconds, false, fault);
@@ -115,7 +115,7 @@ impl Flight {
         (findings != SensorFindings::default()).then(|| (findings, (self.step - before) as f32 * DT))
     }
 
-    /// Flies for so many seconds, whatever is found.
+    /// Flies `seconds`, with or without findings.
     pub fn fly_on(&mut self, seconds: f32, mut fault: impl FnMut(&mut Readings)) {
         for n in 0..(seconds / DT) as u64 {
             self.one(false, n as f32 * DT, &mut fault);
@@ -131,7 +131,7 @@ impl Flight {
         }
     }
 
-    /// One inertial sample, and what else comes with it.
+    /// One inertial sample, and the other samples due with it.
     fn one(&mut self, stands: bool, time: f32, fault: &mut impl FnMut(&mut Readings)) {
         self.step += 1;
         let now = Instant::from_micros(1_000_000 + self.step * 2_500);
@@ -189,10 +189,10 @@ impl Flight {
         }
     }
 
-    /// The body leans to and fro, and its thrust carries its weight meanwhile.
+    /// Tilts the body back and forth; the thrust carries its weight.
     fn moves(&mut self, time: f32) {
         let Vehicle { lean, swing, .. } = self.vehicle;
-        // It does not begin from one sample to the next.
+        // It starts gradually, not from one sample to the next.
         let grown = |time: f32| lean * (1.0 - math::exp(-time / SPOOLS));
         let angles = |time: f32| [swing, 1.3 * swing].map(|swing| grown(time) * math::sin(swing * time));
         let ([roll, pitch], [roll_next, pitch_next]) = (angles(time), angles(time + DT));
@@ -236,7 +236,7 @@ impl Flight {
         let turned = core::mem::take(&mut self.turned);
         let distance = self.estimate.height / frame::cos_tilt(&self.estimate.attitude);
         let bias = self.estimate.gyro_bias;
-        // As the estimator's model has it: the camera is compensated with the raw rates.
+        // The estimator compensates the camera with the raw rates.
         let measured = [0, 1].map(|axis| (counts[axis] - turned[axis]) / interval * distance);
         let body = self.estimate.attitude.inverse_transform_vector(&self.estimate.velocity);
         let predicted = [body.x - distance * bias.y, body.y + distance * bias.x];
@@ -251,7 +251,7 @@ impl Flight {
             let world = self.estimate.attitude.transform_vector(&Vec3::new(x, y, 0.0));
             // A velocity that is too large to the north comes from a nose that is too low.
             let turn = Vec3::new(world.y, -world.x, 0.0);
-            // The higher it is the noisier is a velocity.
+            // The noise of a velocity grows with the height.
             let share = (LOW / self.vehicle.height).min(1.0);
             let [velocity, tilt, bias] = GAINS.map(|gain| gain * share);
             let estimate = &mut self.estimate;
@@ -279,7 +279,7 @@ impl Flight {
         TofData { distance: range, valid: true, ..TofData::default() }
     }
 
-    /// Three independent numbers with a standard deviation of one.
+    /// Three independent numbers with unit standard deviation.
     fn noise(&mut self) -> Vec3 {
         Vec3::from_fn(|_| {
             let mut sum = -6.0;

@@ -1,10 +1,10 @@
-//! Faults of the camera, and none.
+//! Camera faults, and flights without a fault.
 
 use crate::body::{Flight, Readings, VEHICLES};
 use stampfly_types::math;
 use stampfly_types::messages::{Finding, SensorFindings};
 
-/// What each vehicle finds when a fault begins after it has flown for so long, s.
+/// Findings for each vehicle when a fault begins after `delay` seconds of flight.
 fn found(delay: f32, fault: fn(&mut Readings)) -> Vec<Option<(SensorFindings, f32)>> {
     let flights = VEHICLES.iter().flat_map(|vehicle| (1..4).map(move |seed| (*vehicle, seed)));
     let flights = flights.map(|(vehicle, seed)| {

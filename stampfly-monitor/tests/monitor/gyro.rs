@@ -1,4 +1,4 @@
-//! A gyro whose zero moves.
+//! Shifts and jumps of the gyro's zero.
 
 use crate::body::{Flight, VEHICLES};
 use stampfly_types::messages::Finding;

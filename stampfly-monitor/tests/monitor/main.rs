@@ -1,4 +1,4 @@
-//! The monitor beside an estimator with fixed gains, on a vehicle that leans to and fro.
+//! The monitor with an estimator of fixed gains, on a vehicle that tilts back and forth.
 
 mod body;
 mod camera;

@@ -1,9 +1,9 @@
-//! Faults of the range finder, and doors.
+//! Range finder faults, and doors.
 
 use crate::body::{Flight, Readings, VEHICLES};
 use stampfly_types::messages::Finding;
 
-/// What is found when a fault begins after six seconds in the air.
+/// Findings when a fault begins after six seconds of flight.
 fn found(fault: impl Fn(&mut Readings) + Copy) -> Vec<Option<(Finding, f32)>> {
     let flights = (1..4).map(|seed| {
         let mut flight = Flight::new(VEHICLES[0], seed);
@@ -38,7 +38,7 @@ fn what_is_never_compared_is_stuck_if_it_stays_at_a_value_and_nothing_if_it_does
         assert_eq!(finding, Finding::Stuck);
         assert!(after < 1.0, "{after} s");
     }
-    // A smeared window, which is read with noise. Nothing holds the height of this estimate meanwhile.
+    // A smeared window, with noise. The height of this estimate is not held meanwhile.
     for found in found(|readings| readings.range = 0.03 + 1e-3 * (20.0 * readings.time).fract()) {
         assert!(found.is_none_or(|(range, _)| range == Finding::None), "{found:?}");
     }
@@ -58,7 +58,7 @@ fn a_barometer_that_falls_silent_is_no_fault_of_the_range() {
     for found in found(|readings| readings.altitude = f32::NAN) {
         assert_eq!(found, None);
     }
-    // Nor is a climb that nothing else measures.
+    // Nor is a climb that no other sensor measures.
     let (mut flight, climbs) = (Flight::new(VEHICLES[0], 1), 0.3);
     assert_eq!(flight.until_found(6.0, |_| ()), None);
     flight.truth.velocity.z -= climbs;

@@ -93,6 +93,7 @@ impl Covariance {
                 innovation -= shared * result.whitened[before];
             }
             let variance = dot(&column) + noise;
+            // Rounding may make H·P·Hᵀ slightly negative.
             let scale = 1.0 / math::sqrt(math::larger(variance, noise));
             for (gain, lanes) in result.gain[axis].iter_mut().zip(&column) {
                 *gain = lanes.times(scale);

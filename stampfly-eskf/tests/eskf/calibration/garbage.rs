@@ -1,11 +1,11 @@
-//! What no sensor sends.
+//! Calibrations with impossible samples.
 
 use proptest::prelude::*;
 use stampfly_eskf::calibration::{EllipsoidFit, LevelTrim, SixPosition, StillCalibration, TemperatureTable};
 use stampfly_types::messages::{BaroData, ImuData, MagData};
 use stampfly_types::{Duration, Instant, Vec3};
 
-/// Numbers a broken sensor sends, mixed with those of a working one.
+/// Values of a broken sensor, mixed with those of a working one.
 fn number(usual: f32) -> impl Strategy<Value = f32> {
     prop_oneof![8 => -usual..usual, 1 => any::<f32>(), 1 => Just(0.0f32), 1 => Just(1e19f32), 1 => Just(f32::NAN)]
 }
@@ -31,7 +31,7 @@ fn force() -> impl Strategy<Value = Vec3> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
 
-    /// Short stretches of anything, each number repeated so that some of it counts as still.
+    /// Short stretches of arbitrary values, each repeated so that some of it counts as still.
     #[test]
     fn nothing_that_is_not_finite_comes_out_of_an_inertial_calibration(
         samples in prop::collection::vec((force(), vector(0.03), number(90.0), 1usize..2_000, any::<u16>()), 1..16)

@@ -1,4 +1,4 @@
-//! Still-calibration, six positions, level trim.
+//! Still calibration, six positions, level trim.
 
 use super::{ACCEL_NOISE, CASES, Errors, GYRO_NOISE, Random, still};
 use stampfly_eskf::calibration::{
@@ -26,7 +26,7 @@ fn the_gyro_bias_of_a_still_vehicle_is_found() {
     assert!(errors.report("still: gyro bias", "rad/s").1 < 5.0 * GYRO_NOISE / 31.6);
 }
 
-/// A vehicle that is put on its faces.
+/// A vehicle that is placed on its faces.
 struct Placed {
     calibration: SixPosition,
     random: Random,
@@ -46,7 +46,7 @@ impl Placed {
         force.component_mul(&self.gain) + self.bias
     }
 
-    /// Turns the vehicle, then leaves it alone with this true specific force.
+    /// Turns the vehicle, then leaves it at rest with this true specific force.
     fn hold(&mut self, force: &Vec3) -> Result<Face, SixPositionRefusal> {
         let measured = self.measured(force);
         for step in 0..1_200 {
@@ -61,7 +61,7 @@ impl Placed {
         panic!("neither taken nor refused");
     }
 
-    /// The specific force on a face, leaning by up to 12° an axis.
+    /// The specific force on a face, tilted by up to 12° per axis.
     fn leaning(&mut self, face: Face) -> Vec3 {
         let axis = match face {
             Face::Front => -Vec3::x(),
@@ -80,7 +80,7 @@ fn scale_and_bias_are_found_from_six_leaning_faces() {
     let (mut biases, mut scales, mut lengths) = (Errors::default(), Errors::default(), Errors::default());
     for seed in 0..CASES {
         let mut placed = Placed::new(seed);
-        // In an order of its own; half of the vehicles are put on two faces twice.
+        // In a random order; half of the vehicles are placed on two faces twice.
         let mut order = [0, 1, 2, 3, 4, 5].map(|n| Face::ALL[(n * 5 + seed as usize) % 6]).to_vec();
         if seed % 2 == 1 {
             order.extend([Face::Bottom, Face::Left]);
@@ -138,7 +138,7 @@ fn a_crooked_sensor_is_straightened() {
         });
         let (trim, quality) = found.unwrap();
         trims.0.push((trim.roll - roll).abs().max((trim.pitch - pitch).abs()));
-        // Any vector of the airframe comes out as it was, heading aside.
+        // Any vector of the airframe is recovered, except for heading.
         let vector = random.direction();
         levels.0.push(trim.correct(mount.inverse() * vector).cross(&vector).norm());
         assert!(quality.noise < 1e-4 && quality.force_error.abs() < 0.01, "{quality:?}");

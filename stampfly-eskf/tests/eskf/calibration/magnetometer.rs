@@ -1,4 +1,4 @@
-//! The ellipsoid.
+//! The ellipsoid fit.
 
 use super::{CASES, Errors, MAG_NOISE, Random};
 use stampfly_eskf::calibration::{EllipsoidFailure, EllipsoidFit, MagRefusal};
@@ -100,7 +100,7 @@ fn a_strange_field_is_named() {
         let random = &mut Random::new(1);
         let mut fit = EllipsoidFit::default();
         for step in 0..600u16 {
-            // The strength changes, as it does when a steel door is near.
+            // The strength changes, as near a steel door.
             let strength = strength * (1.0 + drift * math::sin(f32::from(step) * 0.02));
             let _ = fit.add(&(random.direction() * strength));
         }

@@ -1,6 +1,7 @@
-//! The calibrations find what was put in, and survive what no sensor sends.
+//! Calibrations recover the errors put in, and survive impossible samples.
 //!
-//! `cargo test -p stampfly-eskf --test eskf calibration -- --nocapture` prints how near they come, over seeded vehicles.
+//! `cargo test -p stampfly-eskf --test eskf calibration -- --nocapture` prints their accuracy over
+//! seeded vehicles.
 
 mod garbage;
 mod inertial;
@@ -14,11 +15,11 @@ use rand_distr::{Distribution, StandardNormal};
 use stampfly_types::Vec3;
 use stampfly_types::messages::ImuData;
 
-/// Noise of one sample, that of the recorded StampFlys and more: rad/s, m/s², µT.
+/// Noise of one sample, at least that of recorded StampFlys: rad/s, m/s², µT.
 const GYRO_NOISE: f32 = 0.002;
 const ACCEL_NOISE: f32 = 0.02;
 const MAG_NOISE: f32 = 0.5;
-/// Vehicles.
+/// Number of vehicles.
 const CASES: u64 = 100;
 
 struct Random(ChaCha8Rng);
@@ -40,7 +41,7 @@ impl Random {
         Vec3::from_fn(|_| StandardNormal.sample(&mut self.0)) * sigma
     }
 
-    /// Any direction, each as likely as another.
+    /// A direction, uniformly distributed.
     fn direction(&mut self) -> Vec3 {
         self.noise(1.0).normalize()
     }
@@ -51,7 +52,7 @@ impl Random {
 struct Errors(Vec<f32>);
 
 impl Errors {
-    /// Median and largest, printed.
+    /// Prints and returns median and largest.
     fn report(mut self, what: &str, unit: &str) -> (f32, f32) {
         self.0.sort_by(f32::total_cmp);
         let (median, worst) = (self.0[self.0.len() / 2], self.0[self.0.len() - 1]);

@@ -1,4 +1,4 @@
-//! Calibrations as somebody asks for them, on a vehicle that flies with the corrections of an earlier one.
+//! Calibrations on request, on a vehicle that flies with the corrections of an earlier one.
 
 use super::{Errors, MAG_NOISE, Random, still};
 use stampfly_eskf::calibration::{CalibrationSession, Corrections, Corrector, Face};
@@ -7,7 +7,7 @@ use stampfly_types::messages::{
 };
 use stampfly_types::{Duration, GRAVITY, Instant, Quat, Vec3};
 
-/// A vehicle whose sensors are wrong, in somebody's hands.
+/// A vehicle with sensor errors, handled by a person.
 struct Held {
     random: Random,
     bias: Vec3,
@@ -48,7 +48,8 @@ impl Held {
         imu
     }
 
-    /// Lies with this true specific force, after somebody has laid it there, until something is said of it or nothing comes of it.
+    /// Lies with this true specific force after being placed, until the hint changes or the time is
+    /// over.
     fn lie(&mut self, up: &Vec3, seconds: f32) -> CalibrationHint {
         for step in 0..(seconds * 400.0) as u32 {
             self.now += Duration::from_micros(2_500);
@@ -93,7 +94,7 @@ impl Held {
     }
 }
 
-/// Where the table pushes when this face is down.
+/// Direction of the supporting force when this face is down.
 fn up(face: Face) -> Vec3 {
     match face {
         Face::Front => -Vec3::x(),
@@ -117,7 +118,7 @@ fn what_is_found_twice_is_the_same_although_the_second_time_it_was_corrected() {
             let drift = held.warm(12.0);
             assert!(found.accept(&drift), "{drift:?}");
             drifts.0.push((found.drift.gyro - held.drift.0).amax());
-            // The other calibrations at the temperature where the drift is nothing.
+            // The other calibrations run at the temperature without drift.
             held.temperature = 25.0;
             found.drift.reference = 25.0;
             let six = held.six_positions();
@@ -184,7 +185,7 @@ fn it_ends_when_the_vehicle_is_armed_or_nobody_goes_on_and_nothing_is_taken_of_i
         }
         assert_eq!((held.session.report().stage, held.session.is_running()), (stage, false));
         assert!(!found.accept(held.session.report()) && found == Corrections::default());
-        // What ended stays ended, and says nothing else.
+        // A finished calibration stays finished, and reports nothing else.
         let report = *held.session.report();
         held.lie(&(up(Face::Rear) * GRAVITY), 3.0);
         assert_eq!(*held.session.report(), report);

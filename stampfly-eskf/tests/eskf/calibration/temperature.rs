@@ -5,7 +5,7 @@ use stampfly_eskf::calibration::{Coverage, TemperatureRefusal, TemperatureTable}
 use stampfly_types::messages::ImuData;
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// A bias that bends with temperature.
+/// A bias with a curved dependence on temperature.
 fn bias(curve: &[Vec3; 3], temperature: f32) -> Vec3 {
     let [constant, slope, bend] = curve;
     let off = (temperature - 30.0) / 20.0;

@@ -1,15 +1,15 @@
-//! A multirotor whose velocity nothing measures: what its drag tells.
+//! A multirotor whose velocity is not measured: information from drag.
 
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{CalibrationResult, EstimatorCommand, ImuData, TofData, Validity};
 use stampfly_types::{GRAVITY, Instant, Vec3};
 
 const DT: u64 = 2_500;
-/// Of the vehicle, 1/s.
+/// Drag of the vehicle, 1/s.
 const DRAG: f32 = 0.4;
 
-/// Hovers level for ten seconds, at 1.5 m/s to the north when it begins. Gives the true and the estimated velocity, and what is
-/// valid. The filter starts in the air, with a velocity that it does not know.
+/// Hovers level for ten seconds, with an initial velocity of 1.5 m/s north. Returns the true and
+/// the estimated velocity, and the validity. The filter starts in the air with an unknown velocity.
 fn hovers(believed: f32, flying: bool, tilt: f32) -> (f32, Vec3, Validity) {
     let mut eskf = Eskf::new(EskfConfig { drag: believed, ..EskfConfig::default() });
     let still = Vec3::new(0.0, 0.0, -GRAVITY);
@@ -19,7 +19,7 @@ fn hovers(believed: f32, flying: bool, tilt: f32) -> (f32, Vec3, Validity) {
     let mut velocity = 1.5f32;
     for step in 1..=4_000u64 {
         let drag = -DRAG * velocity;
-        // A tilt that the filter does not know of accelerates it.
+        // A tilt that the filter does not know accelerates the vehicle.
         velocity += (drag + GRAVITY * tilt) * 1e-6 * DT as f32;
         if step % 13 == 0 {
             _ = eskf.fuse_tof(

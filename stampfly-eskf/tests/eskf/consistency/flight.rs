@@ -1,4 +1,4 @@
-//! A simulated flight with sensors of the modelled noise: smooth, endless, with a known truth.
+//! A simulated flight with the modelled sensor noise: smooth, endless, with known truth.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -9,15 +9,15 @@ use stampfly_eskf::{Eskf, Estimator};
 use stampfly_types::messages::{BaroData, CalibrationResult, FlowData, ImuData, MagData, TofData};
 use stampfly_types::{Duration, GRAVITY, Instant, Vec3};
 
-/// Between inertial samples, µs.
+/// Interval of inertial samples, µs.
 pub const STEP: Duration = Duration::from_micros(2_500);
-/// How much older than its stamp the end of a flow reading is, and how long it is, s.
+/// Delay of a flow reading's end, and its length, s.
 const FLOW_DELAY: f64 = 0.004;
 const FLOW_INTERVAL: f64 = 0.01;
 /// The earth's field, µT, north and down.
 pub const FIELD: Vec3 = Vec3::new(20.0, 0.0, 40.0);
 
-/// Where the vehicle is and how it moves, after `time` seconds.
+/// Position and motion of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     pub attitude: UnitQuaternion<f64>,
@@ -26,12 +26,12 @@ pub struct Pose {
     pub acceleration: Vector3<f64>,
 }
 
-/// A path, and what its sensors do wrong.
+/// A path, and the errors of its sensors.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// What the clock shows at its beginning.
+    /// Reading of the clock at the start.
     pub start: Instant,
-    /// Velocity on top of the path's, world; it dies out within a second.
+    /// Additional world velocity, which decays within a second.
     pub extra: Vector3<f64>,
     pub gyro_bias: Vec3,
     pub accel_bias: Vec3,
@@ -49,7 +49,7 @@ impl Flight {
         }
     }
 
-    /// The instant `steps` inertial samples after the beginning.
+    /// The instant `steps` inertial samples after the start.
     pub fn at(&self, steps: u64) -> Instant {
         self.start + STEP * steps
     }
@@ -58,7 +58,8 @@ impl Flight {
         at.as_micros().wrapping_sub(self.start.as_micros()).cast_signed() as f64 * 1e-6
     }
 
-    /// Two metres above the floor, to and fro by half a metre, leaning by a few degrees, looking about.
+    /// Two metres above the floor, half a metre back and forth, tilting by some degrees, changing
+    /// the heading.
     pub fn pose(&self, at: Instant) -> Pose {
         const SWINGS: [(f64, f64, f64); 3] = [(0.5, 0.9, 0.0), (0.4, 1.1, 1.0), (0.1, 0.6, 2.0)];
         const DYING: f64 = 0.3;
@@ -150,7 +151,7 @@ impl Flight {
         MagData { field: narrow(field) + self.noise3(0.5) }
     }
 
-    /// What a still vehicle would have measured in the attitude of the beginning.
+    /// The still calibration in the initial attitude.
     pub fn calibration(&self) -> CalibrationResult {
         let attitude = self.pose(self.start).attitude;
         let level = attitude.inverse() * Vector3::new(0.0, 0.0, -f64::from(GRAVITY));
@@ -164,7 +165,7 @@ impl Flight {
         }
     }
 
-    /// Offers what is due after so many inertial samples: all sensors at their rates, on time.
+    /// Feeds the samples due at this step: all sensors at their rates, on time.
     pub fn feed(&mut self, eskf: &mut Eskf, steps: u64) {
         let at = self.at(steps);
         eskf.predict(at, &self.imu(at));
@@ -182,7 +183,7 @@ impl Flight {
         }
     }
 
-    /// How far off the estimate is: tilt (rad), velocity (m/s), height (m).
+    /// Errors of the estimate: tilt (rad), velocity (m/s), height (m).
     pub fn errors(&self, eskf: &Eskf, at: Instant) -> [f64; 3] {
         let (pose, estimate) = (self.pose(at), eskf.estimate());
         let down = wide(estimate.attitude.inverse() * Vec3::z());
@@ -190,7 +191,7 @@ impl Flight {
         let body = |velocity: Vector3<f64>, attitude: UnitQuaternion<f64>| attitude.inverse() * velocity;
         let [w, x, y, z] = estimate.attitude.wxyz().map(f64::from);
         let attitude = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
-        // In the body, because nothing but a magnetometer shows the heading.
+        // In body axes, because only a magnetometer observes the heading.
         let velocity = body(wide(estimate.velocity), attitude) - body(pose.velocity, pose.attitude);
         [tilt, velocity.norm(), (f64::from(estimate.height) + pose.position.z).abs()]
     }
@@ -204,7 +205,8 @@ fn narrow(vector: Vector3<f64>) -> Vec3 {
     vector.cast::<f32>().into()
 }
 
-/// Is the covariance finite, exactly symmetric and positive definite, by a Cholesky factorisation in double precision?
+/// Whether the covariance is finite, exactly symmetric and positive definite, by a Cholesky
+/// factorisation in double precision.
 pub fn is_sound(eskf: &Eskf) -> bool {
     let p = eskf.covariance();
     let symmetric = (0..N).all(|i| (0..i).all(|j| p.get(i, j).to_bits() == p.get(j, i).to_bits()));

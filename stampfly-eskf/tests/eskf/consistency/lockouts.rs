@@ -1,6 +1,6 @@
-//! From any error out of a box the filter recovers, or reports divergence, within a stated time.
+//! From any error within a box the filter recovers, or reports divergence, within a stated time.
 //!
-//! The box, at one instant of a flight whose sensors have the modelled noise:
+//! The box, at one instant of a flight with the modelled sensor noise:
 //!
 //! | error | up to |
 //! |---|---|
@@ -10,8 +10,8 @@
 //! | gyro bias | 0.05 rad/s about each axis |
 //! | accelerometer bias | 0.5 m/s² along each axis |
 //!
-//! The errors come in through the interface: a still-calibration that was none, and a range from before a jump.
-//! Recovered means within [`LIMITS`] from then on.
+//! The errors enter through the interface: a false still calibration, and a range from before a
+//! jump. Recovered means permanently within [`LIMITS`].
 
 use super::flight::{Flight, is_sound};
 use proptest::prelude::*;
@@ -21,13 +21,14 @@ use stampfly_eskf::{Eskf, EskfConfig, Estimator};
 use stampfly_types::messages::{EstimatorCommand, TofData};
 use stampfly_types::{Instant, Quat, Vec3, math};
 
-/// Tilt, velocity, height: rad, m/s, m. Of the tilt 0.07 rad are what the box's accelerometer bias looks like.
+/// Tilt, velocity, height: rad, m/s, m. 0.07 rad of tilt correspond to the accelerometer bias of
+/// the box.
 const LIMITS: [f64; 3] = [0.1, 0.3, 0.1];
-/// Recovered, or reported lost, after so many seconds: every time, 95 times of a hundred, every second time.
+/// Time until recovery or report, s: always, in 95 of 100 cases, in every second case.
 const WITHIN: f64 = 12.0;
 const MOST_WITHIN: f64 = 6.0;
 const HALF_WITHIN: f64 = 3.0;
-/// Watched for so many seconds.
+/// Duration of the observation, s.
 const WATCHED: f64 = 15.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +41,7 @@ struct Wrong {
     accel_bias: [f32; 3],
 }
 
-/// Seconds until the estimate was right for good, and until it said that it was lost.
+/// Time until the estimate was permanently right, and time until it reported divergence, s.
 fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
     let mut flight = Flight::new(Instant::from_secs(100), seed);
     flight.extra = wrong.velocity.into();
@@ -53,7 +54,7 @@ fn recovery(wrong: &Wrong, seed: u64) -> (f64, Option<f64>) {
     let mut eskf = Eskf::new(EskfConfig::default());
     eskf.initialize(flight.start, &calibration);
     eskf.command(flight.start, &EstimatorCommand { flying: true, ..EstimatorCommand::default() });
-    // The estimate's own tilt would refuse a range: one that fits it tells where the floor was.
+    // The wrong tilt would make the filter refuse a range: feed one that fits it.
     let cos_tilt = eskf.nominal().cos_tilt();
     let range = flight.tof(flight.start);
     let distance = (range.distance + wrong.height) / cos_tilt.max(0.8);
@@ -96,7 +97,7 @@ fn any_error_of_the_box_is_corrected_or_reported_as_divergence() {
         .map(|seed| {
             let wrong = box_of_errors().new_tree(&mut runner).expect("a draw").current();
             let (wrong_until, lost_at) = recovery(&wrong, seed);
-            // Whoever has been told that the estimate is lost need not wait for it.
+            // After a report of divergence, recovery is not required.
             let told = lost_at.map_or(wrong_until, |at| wrong_until.min(at));
             assert!(told <= WITHIN, "wrong until {wrong_until} s, reported lost at {lost_at:?}: {wrong:?}");
             told

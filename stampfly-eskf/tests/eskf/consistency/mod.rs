@@ -1,5 +1,5 @@
-//! Consistency of the error-state Kalman filter: it recovers or reports divergence, takes no harm from bad time, stays
-//! sound for hours, and tells what a stuck sensor is worth.
+//! Consistency of the error-state Kalman filter: it recovers or reports divergence, tolerates wrong
+//! time stamps, stays sound for hours, and bounds the effect of a frozen sensor.
 
 mod drag;
 mod flight;

@@ -1,4 +1,4 @@
-//! A restart in flight, and inertial samples that are garbage.
+//! Restarts in flight, and corrupt inertial samples.
 
 use super::flight::{Flight, is_sound};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator};
@@ -45,7 +45,7 @@ fn b1_a_reset_in_flight_keeps_attitude_heading_and_biases() {
     }
 }
 
-/// Every bit: what is written of a number tells it from every other one, the zeros' signs included.
+/// Bit for bit: the text form of a number is unique, including the sign of zero.
 #[test]
 fn a_filter_that_begins_again_in_its_place_is_a_new_one_bit_for_bit() {
     let indoors = EskfConfig::indoors();
@@ -62,7 +62,7 @@ fn a_filter_that_begins_again_in_its_place_is_a_new_one_bit_for_bit() {
         let (mut told, mut new) = (eskf.clone(), Eskf::new(*after));
         told.begin_again(after);
         assert_eq!(format!("{told:?}"), format!("{new:?}"), "{seed}");
-        // And it flies as one.
+        // And it flies like one.
         for filter in [&mut told, &mut new] {
             filter.initialize(flight.at(1_200), &flight.calibration());
         }
@@ -72,7 +72,7 @@ fn a_filter_that_begins_again_in_its_place_is_a_new_one_bit_for_bit() {
             same.feed(&mut new, step);
         }
         assert_eq!(format!("{told:?}"), format!("{new:?}"), "{seed}");
-        // Control: a filter that did not begin again is another one.
+        // Control: a filter that was not restarted differs.
         flight.feed(&mut eskf, 2_001);
         assert_ne!(format!("{eskf:?}"), format!("{new:?}"), "{seed}");
     }
@@ -92,7 +92,7 @@ fn a_reset_on_the_ground_starts_from_the_calibration() {
 fn a_velocity_beyond_any_flight_is_divergence_without_flow_too() {
     let (mut flight, mut eskf) = flown_with(EskfConfig { max_velocity: 50.0, ..EskfConfig::default() }, 2, 1);
     let mut told = None;
-    // The accelerometer is dead, and nothing else measures.
+    // The accelerometer is dead, and no other sensor measures.
     for step in 801..=4_800 {
         let at = flight.at(step);
         eskf.predict(at, &ImuData { accel: Vec3::zeros(), ..flight.imu(at) });

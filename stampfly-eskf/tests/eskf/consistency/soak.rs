@@ -1,4 +1,4 @@
-//! Two hours of flight at 400 Hz with all sensors, across the instant at which 32 bits of microseconds overflow.
+//! Two hours of flight at 400 Hz with all sensors, across the overflow of 32-bit microseconds.
 
 use super::flight::{Flight, is_sound};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
@@ -12,7 +12,7 @@ fn two_hours_leave_it_as_sound_as_the_first_minute() {
     eskf.initialize(flight.start, &flight.calibration());
     let (mut squares, mut flows) = (0.0, 0u32);
     for step in 1..=2 * 3600 * 400u64 {
-        // Flow by itself, so that its innovations can be watched.
+        // Flow separately, so that its innovations can be observed.
         let at = flight.at(step);
         let imu = flight.imu(at);
         eskf.predict(at, &imu);

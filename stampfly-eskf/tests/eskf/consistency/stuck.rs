@@ -1,11 +1,11 @@
-//! Sensors that lie in the ways sensors do: what they cost is bounded, and told.
+//! Typical sensor faults: their effect is bounded and reported.
 
 use super::flight::{Flight, is_sound};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion, Refusal};
 use stampfly_types::messages::{FlowData, ImuData, MagData, TofData, Validity};
 use stampfly_types::{Instant, Vec3};
 
-/// What a broken sensor makes of a sample.
+/// Fault of a sample.
 #[derive(Clone, Copy)]
 struct Broken {
     imu: fn(ImuData) -> ImuData,
@@ -15,7 +15,8 @@ struct Broken {
 
 const SOUND: Broken = Broken { imu: |v| v, tof: |v| v, flow: |v| v };
 
-/// Eight seconds of flight, then `seconds` more with these sensors: the filter, and its errors at the end.
+/// Eight seconds of flight, then `seconds` with these sensors. Returns the filter and its errors at
+/// the end.
 fn fly(broken: Broken, seconds: u64, mut told: impl FnMut(Fusion)) -> (Eskf, [f64; 3]) {
     let mut flight = Flight::new(Instant::from_secs(10), 9);
     let mut eskf = Eskf::new(EskfConfig::default());
@@ -44,7 +45,7 @@ fn fly(broken: Broken, seconds: u64, mut told: impl FnMut(Fusion)) -> (Eskf, [f6
 
 #[test]
 fn a_stuck_range_moves_the_height_no_farther_than_itself() {
-    // The vehicle goes up and down by 10 cm; the range stays at what it was.
+    // The vehicle moves up and down by 10 cm; the range stays constant.
     let tof = |tof: TofData| TofData { distance: 2.0, ..tof };
     let (_, [tilt, velocity, height]) = fly(Broken { tof, ..SOUND }, 30, |_| {});
     assert!(tilt < 0.05 && velocity < 0.3 && height < 0.15, "{tilt} rad, {velocity} m/s, {height} m");
@@ -81,8 +82,9 @@ fn flow_of_low_quality_is_refused_and_velocity_becomes_invalid() {
 
 #[test]
 fn stuck_flow_of_good_quality_does_bounded_harm() {
-    // A sensor that says "nothing moves" and vouches for it, over half a metre a second of swinging: nothing else on
-    // board measures velocity, so the state is reset to it. That costs the velocity and must not cost the tilt.
+    // A sensor reports "no motion" as valid while the vehicle swings at 0.5 m/s. No other sensor
+    // measures velocity, so the state is reset to it. That affects the velocity and must not affect
+    // the tilt.
     let flow = |flow: FlowData| FlowData { delta_x: 0.0, delta_y: 0.0, ..flow };
     let (eskf, [tilt, velocity, height]) = fly(Broken { flow, ..SOUND }, 30, |_| {});
     let reported = eskf.status().diverged || eskf.status().resets > 0;
@@ -100,7 +102,7 @@ fn a_gyro_of_nothing_but_zeros_is_harmless() {
 
 #[test]
 fn a_clipping_accelerometer_does_not_carry_the_height_away() {
-    // Vibration beyond the range: the downward half is cut off, and the mean is 1.5 m/s² short.
+    // Vibration beyond the range: the downward half is clipped, and the mean is 1.5 m/s² too small.
     let imu = |imu: ImuData| ImuData { accel: Vec3::new(imu.accel.x, imu.accel.y, imu.accel.z.max(-9.0) + 0.7), ..imu };
     let (eskf, [tilt, velocity, height]) = fly(Broken { imu, ..SOUND }, 20, |_| {});
     assert!(!eskf.status().diverged);
@@ -122,7 +124,7 @@ fn a_bent_field_costs_little_tilt() {
         let imu = flight.imu(at);
         eskf.predict(at, &imu);
         _ = eskf.fuse_flow(at, &flight.flow(at));
-        // The motors' current bends it by up to twice its strength, on and off.
+        // The motor current distorts it by up to twice its strength, on and off.
         let bend = if step / 800 % 2 == 1 { Vec3::new(-50.0, 70.0, 0.0) } else { Vec3::zeros() };
         let told = eskf.fuse_mag(at, &MagData { field: flight.mag(at).field + bend });
         gated += u32::from(matches!(told, Fusion::Gated { .. } | Fusion::Refused(_)));

@@ -1,4 +1,5 @@
-//! Bad time is harmless: late, swapped, repeated and future measurements, steps of any length, a clock anywhere.
+//! Wrong time stamps are harmless: late, swapped, repeated and future measurements, steps of any
+//! length, any clock value.
 
 use super::flight::{Flight, STEP, is_sound};
 use proptest::prelude::*;
@@ -15,7 +16,7 @@ fn started(flight: &Flight) -> Eskf {
     eskf
 }
 
-/// Ten seconds of flight at a start of the clock; the estimate must be good at the end.
+/// Ten seconds of flight from a start of the clock; the estimate must be good at the end.
 fn fly(start: Instant) -> Eskf {
     let mut flight = Flight::new(start, 5);
     let mut eskf = started(&flight);
@@ -31,7 +32,7 @@ fn fly(start: Instant) -> Eskf {
 #[test]
 fn the_clock_may_begin_anywhere() {
     let usual = fly(Instant::from_secs(10));
-    // Two seconds below what 32 bits of microseconds hold, and where 53 bits of a double would no longer do.
+    // Two seconds before 32 bits of microseconds overflow, and beyond the 53 bits of a double.
     for start in [(1 << 32) - 2_000_000, (1 << 53) + 1, u64::MAX - 3_600_000_000] {
         let other = fly(Instant::from_micros(start));
         assert_eq!(usual.nominal(), other.nominal(), "{start}");
@@ -41,13 +42,14 @@ fn the_clock_may_begin_anywhere() {
 
 #[test]
 fn late_measurements_do_as_well_as_those_on_time() {
-    // Every measurement on time, and every one up to 80 ms late but rightly stamped: flow is 9 ms old by itself.
+    // Every measurement on time, and every one up to 80 ms late with correct stamps. Flow itself is
+    // 9 ms old.
     let run = |most: u64| {
         let mut flight = Flight::new(Instant::from_secs(10), 7);
         let mut eskf = started(&flight);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let delays = Uniform::new_inclusive(0, most).expect("a range");
-        // Due step, then in the order of stamps: a sensor's samples arrive in order.
+        // Sorted by due step, then by stamp: the samples of one sensor arrive in order.
         let mut tofs: Vec<(u64, Instant, TofData)> = Vec::new();
         let mut flows: Vec<(u64, Instant, FlowData)> = Vec::new();
         let (mut refused, mut squares) = (0, [0.0; 3]);
@@ -110,7 +112,7 @@ fn what_cannot_be_placed_is_refused_with_a_reason() {
     assert_eq!(tof(now + millis(21)), Fusion::Refused(Refusal::Future));
     assert_eq!(tof(Instant::MAX), Fusion::Refused(Refusal::Future));
     assert_eq!(tof(Instant::ZERO), Fusion::Refused(Refusal::Stale));
-    // Step 390 brought the last one: that stamp and older ones are no news.
+    // Step 390 had the last one: that stamp and older ones are repeated.
     let last = now - STEP * 11;
     assert_eq!(tof(last), Fusion::Refused(Refusal::Repeated));
     assert_eq!(tof(last - Duration::from_micros(1)), Fusion::Refused(Refusal::Repeated));
@@ -121,7 +123,7 @@ fn what_cannot_be_placed_is_refused_with_a_reason() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(30))]
-    /// Stamps of −1 to +20 ms against the inertial sensor, in any order between the sensors.
+    /// Stamps of −1 to +20 ms relative to the inertial sensor, in any order between the sensors.
     #[test]
     fn stamps_around_the_present_are_harmless(seed: u64) {
         let mut flight = Flight::new(Instant::from_secs(10), seed);
@@ -152,7 +154,7 @@ proptest! {
         prop_assert!(tilt < 0.08 && velocity < 0.3 && height < 0.05, "{tilt} rad, {velocity} m/s, {height} m");
     }
 
-    /// Steps of any length, forwards, backwards and none.
+    /// Steps of any length, forwards, backwards and zero.
     #[test]
     fn steps_of_any_length_leave_the_filter_sound(
         start in prop_oneof![Just(0u64), Just((1u64 << 32) - 500_000), Just(u64::MAX - 5_000_000), any::<u64>()],

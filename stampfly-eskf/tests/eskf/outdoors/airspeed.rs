@@ -1,4 +1,4 @@
-//! Airspeed alone, after the receiver has fallen silent, in a wind that nobody told.
+//! Airspeed alone, after the receiver has become silent, in an unknown wind.
 
 use super::run::heading;
 use super::world::{Setting, World, vector};
@@ -24,8 +24,9 @@ fn airspeed_alone_holds_velocity_and_position_in_an_unknown_wind() {
     }
 }
 
-/// Over two minutes after a minute with fixes: the worst error of position, m, and velocity, m/s, the worst one of both in
-/// deviations, of heading, degrees, and the share of the time without a valid position.
+/// Over two minutes after a minute with fixes: the largest error of position, m, and velocity, m/s,
+/// the larger one of both in standard deviations, the heading error, degrees, and the share of the
+/// time without a valid position.
 #[derive(Debug, Default)]
 struct Flown {
     position: f64,

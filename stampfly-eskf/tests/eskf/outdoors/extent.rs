@@ -1,4 +1,4 @@
-//! Far, high and fast: limits are configuration, and the default is no room.
+//! Large distances, heights and speeds: limits are configurable, and the default is not a room.
 
 use super::run::{Plan, check, run};
 use super::world::Setting;

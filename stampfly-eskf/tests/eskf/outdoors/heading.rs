@@ -1,4 +1,4 @@
-//! Where north is: found in motion, from the field with its declination, or given; and valid only when it is known.
+//! Heading: found in motion, from the field with its declination, or given; valid only when known.
 
 use super::run::{Plan, check, run, wrapped};
 use super::world::{Setting, World, vector};

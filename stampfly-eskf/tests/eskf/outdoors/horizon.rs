@@ -1,4 +1,4 @@
-//! Receivers are late: 50 to 300 ms, rightly stamped.
+//! Late receivers: 50 to 300 ms, with correct stamps.
 
 use super::run::{Plan, check, run};
 use super::world::Setting;

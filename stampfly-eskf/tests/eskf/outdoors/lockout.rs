@@ -1,4 +1,4 @@
-//! Fixes that are wrong, and fixes that do not come.
+//! Wrong fixes and missing fixes.
 
 use super::run::{Plan, check, run};
 use super::world::Setting;
@@ -47,7 +47,7 @@ fn after_half_a_minute_without_fixes_it_is_where_the_receiver_says() {
 fn errors_that_wander_are_not_taken_for_motion() {
     let setting = Setting { wander_sigma: 1.5, fix_delay: 0.15, seed: 3, ..Setting::default() };
     let outcome = run(setting, Plan::default(), EskfConfig::outdoors());
-    // Nothing takes such an error out: the receiver's own is the bar.
+    // No sensor removes such an error: the limit is that of the receiver.
     assert!(
         outcome.horizontal < 1.5 * 1.5 && outcome.heading < 3.0,
         "{} m, {} degrees",

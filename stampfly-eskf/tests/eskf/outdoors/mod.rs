@@ -1,12 +1,12 @@
-//! Outdoors: an inertial sensor, a satellite receiver, a barometer and a magnetometer on a vehicle that goes far and fast, in
-//! simulated truth with seeded errors.
+//! Outdoors: inertial sensor, satellite receiver, barometer and magnetometer on a vehicle that
+//! moves far and fast, in a simulated world with seeded errors.
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
 //! | `world.rs` | the truth and its sensors |
-//! | `run.rs` | an estimator in that world, and how well it did |
-//! | `reference.rs` | what the receiver's noise allows: a Kalman filter in `f64` that knows attitude and biases |
-//! | the others | one concern each |
+//! | `run.rs` | an estimator in that world, and its errors |
+//! | `reference.rs` | the limit set by the receiver's noise: a Kalman filter in `f64` that knows attitude and biases |
+//! | others | one topic each |
 
 mod airspeed;
 mod extent;

@@ -1,4 +1,4 @@
-//! Sensors with a model of the user's, axes that are missing, and standing still.
+//! Sensors with a user's model, missing axes, and standing still.
 
 use super::run::heading;
 use super::world::{Setting, World, vector};
@@ -20,7 +20,8 @@ fn north(config: EskfConfig) -> EskfConfig {
     EskfConfig { start_heading: StartHeading::Given { heading: 0.0, sigma: 0.02 }, initial_position: 1.0, ..config }
 }
 
-/// Dead reckoning by wheels alone: speed along the nose and none to the side, 0.2 s late, for two minutes.
+/// Dead reckoning by wheels alone: speed along the nose and no sideways slip, 0.2 s late, for two
+/// minutes.
 #[test]
 fn late_wheel_speeds_hold_velocity_and_position() {
     let mut world = World::new(Setting::default());
@@ -47,13 +48,13 @@ fn late_wheel_speeds_hold_velocity_and_position() {
     assert!(worst < 0.6, "{worst} m/s");
     assert!(estimate.valid.contains(Validity::VELOCITY_XY | Validity::POSITION_XY));
     let end = world.truth(120.0);
-    // 900 m of way, and nothing but the gyro holds the heading.
+    // 900 m of path, and only the gyro holds the heading.
     let off = vector(end.position) - estimate.position;
     assert!(off.norm() < 20.0, "{} m", off.norm());
     assert!((heading(&eskf) - end.heading).sin().abs() < 0.1);
 }
 
-/// Ranges to three beacons in a field, of which one lies.
+/// Ranges to three beacons in a field, one of them wrong.
 #[test]
 fn ranges_to_beacons_place_it_and_one_that_lies_is_left_out() {
     let mut eskf = started(EskfConfig { initial_position: 5.0, ..north(EskfConfig::outdoors()) });

@@ -1,10 +1,11 @@
-//! What the receiver's noise allows: per axis the steady state of a Kalman filter in `f64` that is told attitude and biases, so
-//! that nothing but the accelerometer's noise stands between two fixes.
+//! The limit set by the receiver's noise: per axis, the steady state of a Kalman filter in `f64`
+//! that knows attitude and biases, so that only the accelerometer's noise acts between two fixes.
 
-/// Standard deviation of the position just before and just after a fix, as the root of their mean square, m.
+/// Standard deviation of the position just before and just after a fix, as the root of their mean
+/// square, m.
 ///
-/// `accel`: noise density of the accelerometer, m/s²/√Hz; `period` between fixes of `position` and `velocity` standard
-/// deviation; `delay`: by how much the newest fix is late.
+/// `accel`: noise density of the accelerometer, m/s²/√Hz; `period` between fixes with standard
+/// deviations `position` and `velocity`; `delay` of the newest fix.
 pub fn position_sigma(accel: f64, period: f64, position: f64, velocity: f64, delay: f64) -> f64 {
     let grow = |[pp, pv, vv]: [f64; 3], t: f64| {
         let q = accel * accel;
@@ -27,9 +28,9 @@ pub fn position_sigma(accel: f64, period: f64, position: f64, velocity: f64, del
 
 #[test]
 fn without_motion_it_is_the_mean_of_the_fixes() {
-    // A still accelerometer without noise: the more fixes, the better, for ever.
+    // At rest with a noise-free accelerometer the estimate improves with every fix.
     assert!(position_sigma(1e-9, 0.2, 0.5, 0.1, 0.0) < 0.01);
-    // A useless accelerometer: nearly the receiver's own noise.
+    // With a useless accelerometer it is nearly the receiver's own noise.
     let noisy = position_sigma(1e3, 0.2, 0.5, 0.1, 0.0);
     assert!(noisy > 0.5, "{noisy}");
     assert!(position_sigma(0.1, 0.2, 0.5, 0.1, 0.3) > position_sigma(0.1, 0.2, 0.5, 0.1, 0.0));

@@ -1,4 +1,4 @@
-//! An estimator in that world, and how well it did.
+//! An estimator in that world, and its errors.
 
 use super::world::{Fix, Setting, World, vector};
 use stampfly_eskf::{Eskf, EskfConfig, Estimator, Fusion};
@@ -6,17 +6,17 @@ use stampfly_types::messages::{BaroData, CalibrationResult, Validity};
 use stampfly_types::{GRAVITY, Vec3};
 use std::collections::VecDeque;
 
-/// What is switched on, and what happens to the fixes.
+/// Sensors in use, and faults of the fixes.
 #[derive(Clone, Copy)]
 pub struct Plan {
     pub seconds: f64,
-    /// Errors count from here.
+    /// Errors count from this time.
     pub from: f64,
     pub mag: bool,
     pub baro: bool,
-    /// No fix in this stretch.
+    /// Interval without fixes.
     pub gap: [f64; 2],
-    /// In this stretch fixes are off by so much to the north, m.
+    /// Interval in which fixes are wrong by this distance to the north, m.
     pub multipath: [f64; 3],
 }
 
@@ -26,23 +26,23 @@ impl Default for Plan {
     }
 }
 
-/// How it went.
+/// Result of a run.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// Root mean square of the horizontal position's error per axis, m, and of the vertical one.
+    /// Root mean square error of the horizontal position per axis, m, and of the vertical one.
     pub horizontal: f64,
     pub vertical: f64,
-    /// Root mean square of the heading's error, degrees.
+    /// Root mean square error of the heading, degrees.
     pub heading: f64,
-    /// Worst horizontal error, m.
+    /// Largest horizontal error, m.
     pub worst: f64,
-    /// Share of the time with a position that is not valid.
+    /// Share of the time without a valid position.
     pub invalid: f64,
-    /// Worst error in standard deviations of an output that was valid: position and heading.
+    /// Largest error of a valid output in standard deviations: position and heading.
     pub sigmas: [f64; 2],
-    /// When the heading first was valid, s.
+    /// Time at which the heading first was valid, s.
     pub heading_known: Option<f64>,
-    /// Fixes: positions and velocities offered, gated, refused, moved to.
+    /// Fixes: positions and velocities offered, gated, refused, reset to.
     pub offered: u32,
     pub gated: u32,
     pub refused: u32,
@@ -60,7 +60,7 @@ pub fn wrapped(angle: f64) -> f64 {
     angle.sin().atan2(angle.cos())
 }
 
-/// Flies it.
+/// Runs the estimator.
 pub fn run(setting: Setting, plan: Plan, config: EskfConfig) -> Outcome {
     let mut world = World::new(setting);
     let mut eskf = Eskf::new(config);
@@ -96,7 +96,7 @@ pub fn run(setting: Setting, plan: Plan, config: EskfConfig) -> Outcome {
             let Some(fix) = pending.pop_front() else { break };
             let at = World::instant(fix.at);
             let [h, v] = setting.position_sigma;
-            // The vertical error wanders by half as much again.
+            // The vertical error is half as large again.
             let [h, v] = [h.hypot(setting.wander_sigma), v.hypot(1.5 * setting.wander_sigma)].map(|sigma| sigma as f32);
             let [vh, vv] = setting.velocity_sigma.map(|sigma| sigma as f32);
             let told = [
@@ -134,7 +134,7 @@ pub fn run(setting: Setting, plan: Plan, config: EskfConfig) -> Outcome {
         }
         if estimate.valid.contains(Validity::HEADING) {
             outcome.heading_known.get_or_insert(time);
-            // The body is level: the third attitude error is the heading's.
+            // The body is level: the third attitude error is that of the heading.
             outcome.sigmas[1] = outcome.sigmas[1].max((turned / p(8)).abs());
         }
         if time < plan.from {
@@ -154,8 +154,8 @@ pub fn run(setting: Setting, plan: Plan, config: EskfConfig) -> Outcome {
     outcome
 }
 
-/// Is the position within one and a half times what the receiver's noise allows, and never wrong by more than five
-/// standard deviations and valid?
+/// Checks that the position error is within 1.5 times the limit of the receiver's noise, and never
+/// above five standard deviations while valid.
 pub fn check(name: &str, setting: &Setting, outcome: &Outcome) {
     let Setting { accel_noise, fix_period, position_sigma, velocity_sigma, fix_delay, .. } = *setting;
     let allowed =

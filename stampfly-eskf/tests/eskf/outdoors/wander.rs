@@ -1,10 +1,11 @@
-//! Receivers whose error wanders, and receivers that fall silent: what is claimed is as good as it says.
+//! Receivers with a slowly varying error, and silent receivers: the stated standard deviation is
+//! right.
 
 use super::run::{Plan, run};
 use super::world::Setting;
 use stampfly_eskf::{EskfConfig, StartHeading, aid};
 
-/// With the magnetometer, if there is one.
+/// With or without a magnetometer.
 fn config(mag: bool) -> EskfConfig {
     let outdoors = EskfConfig::outdoors();
     let with = EskfConfig {
@@ -25,7 +26,7 @@ fn a_position_whose_error_wanders_is_no_better_than_it_says() {
             let outcome = run(setting, Plan { mag, seconds: 300.0, ..Plan::default() }, config(mag));
             let name = format!("{wander_sigma} m in {wander_time} s, seed {seed}, magnetometer {mag}");
             println!("{name}: {:.2} m, heading {:.2}, {:?}", outcome.horizontal, outcome.heading, outcome.sigmas);
-            // Nothing takes such an error out: the receiver's own is what it allows.
+            // No sensor removes such an error: the limit is that of the receiver.
             assert!(outcome.horizontal < 1.5 * wander_sigma.hypot(0.5), "{name}: {} m", outcome.horizontal);
             assert!(outcome.heading < 3.0 && outcome.sigmas.iter().all(|off| *off < 5.0), "{name}: {outcome:?}");
             assert_eq!((outcome.resets, outcome.refused), (0, 0), "{name}");
@@ -43,7 +44,8 @@ fn half_a_minute_without_fixes_is_no_more_wrong_than_it_says() {
                 let outcome = run(setting, plan, config(mag));
                 let name = format!("gap {gap:?}, seed {seed}, heading {heading}, magnetometer {mag}");
                 println!("{name}: worst {:.1} m, heading {:.2}, {:?}", outcome.worst, outcome.heading, outcome.sigmas);
-                // An accelerometer that is wrong by 0.01 m/s², and a tilt by a milliradian, are ten metres after 30 s.
+                // An accelerometer error of 0.01 m/s² and a tilt error of one milliradian are ten
+                // metres after 30 s.
                 assert!(outcome.worst < 30.0, "{name}: {} m", outcome.worst);
                 assert!(outcome.heading < 3.0 && outcome.sigmas.iter().all(|off| *off < 5.0), "{name}: {outcome:?}");
                 assert_eq!((outcome.resets, outcome.refused, outcome.gated), (0, 0, 0), "{name}");

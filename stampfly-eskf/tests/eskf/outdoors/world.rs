@@ -1,5 +1,5 @@
-//! The truth and its sensors: a vehicle on a level circle, or on a straight line, that may climb; heading along the course
-//! plus a constant angle.
+//! The truth and its sensors: a vehicle on a level circle or a straight line, optionally climbing;
+//! heading along the course plus a constant angle.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,24 +12,24 @@ pub type V = [f64; 3];
 
 /// Gravity, m/s².
 const G: f64 = 9.80665;
-/// When the filter starts, s: a clock does not begin with it.
+/// Start of the filter, s: a clock does not start with it.
 const START: f64 = 10.0;
 
-/// What is simulated. Times in s, lengths in m, angles in rad.
+/// Parameters of the simulation. Times in s, lengths in m, angles in rad.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
-    /// Inertial samples a second.
+    /// Inertial samples per second.
     pub rate: f64,
-    /// Of the circle; infinite: a straight line to the north.
+    /// Radius of the circle; infinite for a straight line to the north.
     pub radius: f64,
     pub speed: f64,
-    /// Upwards, m/s, after the first five seconds.
+    /// Climb rate, m/s, after the first five seconds.
     pub climb: f64,
-    /// Heading at the start, and how it turns, rad/s, on the circle.
+    /// Initial heading, and its rate on the circle, rad/s.
     pub heading: f64,
-    /// Stands for so long before it moves, s, and needs as long again for its speed.
+    /// Time at rest before it moves, s; accelerates for the same time.
     pub stands: f64,
-    /// Where it starts, from the origin of the receiver's frame.
+    /// Start, relative to the origin of the receiver's frame.
     pub origin: V,
     /// Noise density of the accelerometer, m/s²/√Hz, and of the gyro, rad/s/√Hz.
     pub accel_noise: f64,
@@ -37,11 +37,11 @@ pub struct Setting {
     /// Biases after calibration, body.
     pub accel_bias: V,
     pub gyro_bias: V,
-    /// Time between fixes, and by how much they are late.
+    /// Time between fixes, and their delay.
     pub fix_period: f64,
     pub fix_delay: f64,
-    /// Errors of a fix: white position, horizontal and down, white velocity; and a slowly moving position error with its
-    /// time constant.
+    /// Errors of a fix: white position error, horizontal and down, white velocity error; and a slow
+    /// position error with its time constant.
     pub position_sigma: [f64; 2],
     pub velocity_sigma: [f64; 2],
     pub wander_sigma: f64,
@@ -91,7 +91,7 @@ pub struct Truth {
 /// A fix of the receiver.
 #[derive(Clone, Copy, Debug)]
 pub struct Fix {
-    /// When it is true, and when it arrives.
+    /// Time of validity, and time of arrival.
     pub at: f64,
     pub arrives: f64,
     pub position: V,
@@ -112,13 +112,14 @@ impl World {
         Self { setting, random, wander: [0.0; 3], wander_at: 0.0 }
     }
 
-    /// The instant of so many seconds after the start.
+    /// The instant `time` seconds after the start.
     pub fn instant(time: f64) -> Instant {
         Instant::from_micros(((START + time) * 1e6).round() as u64)
     }
 
-    /// Way, speed and acceleration along the course: from standing to `speed` in a cosine's half, then faster and slower by a
-    /// quarter every eight seconds. At a constant speed on a circle a wrong heading looks like a wrong accelerometer.
+    /// Path, speed and acceleration along the course: from rest to `speed` on half a cosine, then
+    /// speed changes of a quarter every eight seconds. At constant speed on a circle a wrong
+    /// heading would look like an accelerometer error.
     fn along(&self, time: f64) -> V {
         let Setting { stands, speed, .. } = self.setting;
         let since = time - stands;
@@ -128,7 +129,7 @@ impl World {
         let w = std::f64::consts::PI / stands;
         if since >= stands {
             let (surge, w, since) = (0.25 * speed, std::f64::consts::TAU / 8.0, since - stands);
-            // From zero to zero: the acceleration does not jump by more than a tyre lets it.
+            // Starts and ends at zero, so the acceleration does not jump.
             let (sin, cos) = (w * since).sin_cos();
             let way = speed * (since + 0.5 * stands) + surge * (since - sin / w);
             return [way, speed + surge * (1.0 - cos), surge * w * sin];
@@ -144,7 +145,7 @@ impl World {
         let angle = way * turn;
         let (sin, cos) = angle.sin_cos();
         let plan = if turn == 0.0 { [way, 0.0] } else { [radius * sin, radius * (1.0 - cos)] };
-        // A climb begins after five seconds, within one.
+        // The climb starts after five seconds, within one.
         let up = [-climb, 0.0, 0.0].map(|v| v * (time - 5.5).max(0.0))[0];
         let (rise, lift) = if time < 5.0 {
             (0.0, 0.0)
@@ -196,7 +197,7 @@ impl World {
         ImuData { accel, gyro, temperature: 25.0, ..ImuData::default() }
     }
 
-    /// The fix that is true at this time. Its slow error moves on to it.
+    /// The fix that is valid at this time. Advances its slow error.
     pub fn fix(&mut self, time: f64) -> Fix {
         let Setting { fix_delay, position_sigma: [h, v], velocity_sigma: [vh, vv], .. } = self.setting;
         let truth = self.truth(time);
@@ -218,14 +219,14 @@ impl World {
         MagData { field: vector(self.around(field, [0.5; 3])) }
     }
 
-    /// Altitude by the barometer, that of the origin being 100 m.
+    /// Barometric altitude; the origin is at 100 m.
     pub fn altitude(&mut self, time: f64) -> f32 {
         let down = self.truth(time).position[2];
         (100.0 - down + self.normal(0.3)) as f32
     }
 }
 
-/// A vector of the world in the body.
+/// World to body.
 fn body(truth: &Truth, [x, y, z]: V) -> V {
     let (sin, cos) = truth.heading.sin_cos();
     [cos * x + sin * y, cos * y - sin * x, z]
