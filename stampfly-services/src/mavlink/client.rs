@@ -6,7 +6,7 @@ use super::pulse::Pulse;
 use super::said::Said;
 use super::streams::STREAMS;
 use super::unreadable::Unreadable;
-use super::unserved::CommandNotice;
+use super::unserved::Told;
 use crate::refusal::Connection;
 use crate::view::View;
 use stampfly_link::mavlink::MessageData as _;
@@ -79,7 +79,7 @@ pub(super) struct Client<C> {
     /// The next parameter of a list that was asked for.
     pub next_parameter: Option<usize>,
     /// What it was told of that is not done.
-    pub told_of: CommandNotice,
+    pub told_of: Told,
     /// Where a stream of targets last sent the vehicle, north, east, down, heading.
     pub target: Option<[f32; 4]>,
 }
@@ -101,7 +101,7 @@ impl<C> Client<C> {
             signer: guard.map(|guard| Signer::new(guard.key.clone(), 0, guard.epoch)),
             due,
             next_parameter: None,
-            told_of: CommandNotice::NEVER,
+            told_of: Told::NEVER,
             target: None,
         }
     }
