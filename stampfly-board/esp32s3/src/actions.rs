@@ -7,7 +7,7 @@ use stampfly_board::link::Link;
 use stampfly_board::topics::ConsoleEnds;
 use stampfly_flight::console::calibrate::Calibrate;
 use stampfly_param::Parameters;
-use stampfly_services::{VehicleActions as Vehicle, Refusal, Request};
+use stampfly_services::{Refusal, Request, VehicleActions as Vehicle};
 use stampfly_types::Instant;
 use stampfly_types::messages::{GuidedCommand, PilotInput};
 

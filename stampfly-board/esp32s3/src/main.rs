@@ -12,6 +12,7 @@
 
 extern crate alloc;
 
+mod actions;
 mod buzzer;
 mod changes;
 mod channel;
@@ -21,7 +22,6 @@ mod cutoff;
 mod facts;
 mod flash;
 mod flight;
-mod actions;
 #[cfg(feature = "hil")]
 mod hil;
 mod i2c;

@@ -35,8 +35,8 @@ use stampfly_drivers::Timebase;
 use stampfly_link::secure::{Guarded, Key, MAX_BODY, MAX_FRAME, Payload, Policy, Vehicle};
 use stampfly_link::{Address, Session};
 use stampfly_services::CommandArbiter;
-use stampfly_services::requests::QueuedPayload;
 use stampfly_services::radio_requests::{NETWORK_SAMPLES, RADIO_SAMPLES, RadioRequests, Words};
+use stampfly_services::requests::QueuedPayload;
 use stampfly_services::subscription::{RADIO_CHUNK, RADIO_CHUNKS};
 use static_cell::StaticCell;
 
@@ -111,12 +111,15 @@ pub async fn run(parts: Box<Parts>) {
         random.read(&mut seed);
         let air = wifi::start(network, u64::from_le_bytes(seed));
         let say = Say { sender, manager: &manager, network };
-        let in_the_network =
-            join(wifi::carry(air, network, (link, arbiter), requests), wifi::associate(controller, &manager, network, memory));
+        let in_the_network = join(
+            wifi::carry(air, network, (link, arbiter), requests),
+            wifi::associate(controller, &manager, network, memory),
+        );
         join3(receive(receiver, link, arbiter, requests), send(say, &random, link, waiting), in_the_network).await;
     }
     #[cfg(not(feature = "wifi"))]
-    join(receive(receiver, link, arbiter, requests), send(Say { sender, manager: &manager }, &random, link, waiting)).await;
+    join(receive(receiver, link, arbiter, requests), send(Say { sender, manager: &manager }, &random, link, waiting))
+        .await;
 }
 
 /// A new key, which is also handed on to be stored.

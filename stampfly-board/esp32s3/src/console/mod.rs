@@ -10,9 +10,9 @@ mod served;
 mod stations;
 mod storing;
 
+use crate::actions::{Later, VehicleActions};
 use crate::clock::Clock;
 use crate::facts::Facts;
-use crate::actions::{VehicleActions, Later};
 #[cfg(feature = "hil")]
 use crate::hil;
 use crate::memory::{Memory, restart};
@@ -50,7 +50,7 @@ use stampfly_link::secure::Key;
 use stampfly_param::ChangeDetector;
 use stampfly_services::cable::{Cable, fingerprint};
 use stampfly_services::mavlink::Identity;
-use stampfly_services::{CommandArbiter, Places, RadioRequests, ArbitratedAccess, View};
+use stampfly_services::{ArbitratedAccess, CommandArbiter, Places, RadioRequests, View};
 use stampfly_types::messages::CalibrationReport;
 use static_cell::StaticCell;
 
@@ -185,7 +185,20 @@ fn made(parts: Box<Parts>, screen: UsbSerialJtagTx<'static, Async>, version: Str
     #[cfg(feature = "wifi")]
     let network = served::Served::new(parts.network);
     let Parts {
-        memory, health, profile, ends, storage, storage_ends, config, facts, key, link, arbiter, requests, taken, ..
+        memory,
+        health,
+        profile,
+        ends,
+        storage,
+        storage_ends,
+        config,
+        facts,
+        key,
+        link,
+        arbiter,
+        requests,
+        taken,
+        ..
     } = *parts;
     let (detector, flown) = (ChangeDetector::new(config.clone()), (config.clone(), false));
     let cable = Cable::new(IDENTITY, fingerprint(&TOPICS, &config));

@@ -2,8 +2,8 @@
 
 use super::served::Served;
 use super::{Console, IDENTITY, newest_mode};
-use crate::clock::Clock;
 use crate::actions::VehicleActions;
+use crate::clock::Clock;
 use crate::wifi::Ports;
 use core::fmt::Write as _;
 use heapless::String;
@@ -15,7 +15,8 @@ impl Console {
     /// Hears and answers programs in the network.
     #[inline(never)]
     pub(super) fn serve(&mut self) {
-        let Self { known, link, ends, config, later, arbiter, places, network: Served { network, ports, .. }, .. } = self;
+        let Self { known, link, ends, config, later, arbiter, places, network: Served { network, ports, .. }, .. } =
+            self;
         let mut network = network.borrow_mut();
         let (Some(ports), Some(stack)) = (ports, &mut network.stack) else { return };
         let now = Clock.now();

@@ -1,9 +1,9 @@
 //! What stations at the line and on the radio are told and do: questions, changed parameters, the flight record.
 
 use super::{Console, newest_mode, put};
+use crate::actions::Later;
 use crate::changes;
 use crate::clock::Clock;
-use crate::actions::Later;
 use crate::memory::restart;
 use crate::radio::POST;
 use crate::record::Line;
