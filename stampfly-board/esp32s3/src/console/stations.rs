@@ -13,7 +13,7 @@ use stampfly_drivers::Timebase;
 use stampfly_flight::console::Request;
 use stampfly_flight::live::Change;
 use stampfly_services::cable::{BODY, PART, TUNNEL};
-use stampfly_services::requests::{Post, Room};
+use stampfly_services::requests::{QueuedPayload, Room};
 
 /// Bytes of the frames of a chunk of the flight record.
 const CHUNK: usize = BODY.div_ceil(PART) * (TUNNEL + 32);
@@ -79,7 +79,7 @@ impl Console {
             let answered = known.vehicle(config, |vehicle| {
                 let mut room = Room::default();
                 let answer = requests.borrow_mut().questions.answer(now, vehicle, &mut room)?;
-                Some((Post::of(&answer.payload), answer.request))
+                Some((QueuedPayload::of(&answer.payload), answer.request))
             });
             if let Some((post, request)) = answered {
                 if let Some(post) = post {
